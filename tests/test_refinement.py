@@ -281,7 +281,6 @@ def test_no_plan_round_the_hull_names_the_hull_first() -> None:
     ("name", "strategy", "why"),
     [
         ("free", "paper", "no obstacle along the rail is passed"),
-        ("obs3", "paper", "no obstacle along the rail is passed"),
         ("obs1", "paper", ""),
         ("free", "fewest", "strategy 'fewest' chooses its way by itself"),
     ],

@@ -49,9 +49,9 @@ def fuzz(folder: Path, seed: int, count: int, seconds: float) -> dict[str, int]:
 
 
 def test_damaged_files_end_in_one_message(good: Path) -> None:
-    found = fuzz(good, 1, 150, 600.0)
-    assert sum(found.values()) == 150
-    assert found["2"] > 10
+    found = fuzz(good, 1, 60, 600.0)
+    assert sum(found.values()) == 60
+    assert found["2"] > 4
 
 
 @pytest.mark.slow

@@ -52,15 +52,6 @@ def test_help_imports_nothing_heavy(command: list[str]) -> None:
     assert not HEAVY & imported(ended)
 
 
-def test_a_plan_is_made_without_numba_once_its_machine_code_is_there(
-    tmp_path: Path,
-) -> None:
-    command = ("plan", "paper/free", "--strategy", "paper", "--out", str(tmp_path))
-    run(*command)
-    assert "numba" not in imported(run(*command))
-    assert (tmp_path / "trajectory.csv").exists()
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where obs1 was planned and verified, so that all its machine code is there."""

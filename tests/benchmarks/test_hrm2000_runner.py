@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from some_slow import few_of
 
 from benchmarks.hrm2000 import attempt as attempts
 from benchmarks.hrm2000 import run
@@ -158,12 +159,7 @@ def test_distances_from_solids_agree_with_the_nearest_of_many_points() -> None:
 
 
 @pytest.mark.parametrize(
-    "family",
-    [
-        "windows",
-        "short_rail",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("port", "blades")),
-    ],
+    "family", few_of(["short_rail", "windows", "port", "blades"], 1)
 )
 def test_sampling_finds_no_fault_in_a_witness_and_each_kind_in_a_spoiled_one(
     family: str, tmp_path: Path

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from some_slow import few_of
 
 from benchmarks.hrm2000.references import REFERENCES, intelligent, reference
 from benchmarks.hrm2000.references.arm import Arm
@@ -66,7 +67,7 @@ def test_the_arm_lies_on_the_trail_of_its_tip() -> None:
             assert abs(place[1] - y) < 1e-6
 
 
-@pytest.mark.parametrize("name", ["follow-the-leader", "mda-rrt"])
+@pytest.mark.parametrize("name", few_of(["follow-the-leader", "mda-rrt"], 1))
 def test_the_square_across_the_rail_cannot_be_followed(name: str) -> None:
     with pytest.raises(NoPlanFound):
         reference(name)(FREE, ROBOT, link_clearance(FREE))

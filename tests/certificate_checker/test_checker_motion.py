@@ -225,7 +225,7 @@ def test_limits_of_smooth_motions_are_those_of_the_curve(degree: int) -> None:
     time = np.linspace(0.0, 1.0, 20_001)
     weights = [comb(degree, i) * time**i * (1 - time) ** (degree - i)
                for i in range(degree + 1)]  # fmt: skip
-    for _ in range(60):
+    for _ in range(20):
         pair = rng.normal(size=(2, degree + 1))
         alpha, theta = pair @ np.array(weights)
         low, high = 0.0, 100.0
@@ -243,7 +243,7 @@ def test_limits_of_smooth_motions_are_those_of_the_curve(degree: int) -> None:
                 rows._limits(motion)
                 kept = True
             said[more < 1.0, kept] += 1
-    assert said == {(True, True): 60, (False, False): 60}
+    assert said == {(True, True): 20, (False, False): 20}
 
 
 @pytest.mark.parametrize("degree", [3, 5])

@@ -110,7 +110,7 @@ class Looking:
 @pytest.mark.parametrize("kind", ["target", "direction", "directions"])
 @pytest.mark.parametrize("smooth", [False, True])
 def test_a_narrower_cone_is_refused(kind: str, smooth: bool, tmp_path: Path) -> None:
-    for seed in range(3):
+    for seed in range(1 if smooth else 3):
         case = Looking(tmp_path, seed, smooth)
         case.ask(30.0, kind)
         worst = case.look()

@@ -221,7 +221,7 @@ def test_a_forged_claim_is_refused(tmp_path: Path, bodies: str, what: str) -> No
 def test_numbers_changed_at_random_are_refused_or_true(tmp_path: Path) -> None:
     made, rng = Made(tmp_path, "floating", 2), np.random.default_rng(0)
     lines, refused = made.certified(), 0
-    for _ in range(60):
+    for _ in range(30):
         forged = copy.deepcopy(lines)
         change_number(forged, rng)
         outcome = made.check(forged)
@@ -229,7 +229,7 @@ def test_numbers_changed_at_random_are_refused_or_true(tmp_path: Path) -> None:
         if outcome.accepted:  # a claim that says less, or a plane that holds as well
             (place,) = changes(lines, forged) or [()]
             assert place[:2] not in [(0, "links"), (0, "pieces"), (0, "pairs")]
-    assert refused > 25
+    assert refused > 12
 
 
 def assert_read_alike(files: RobotFiles, rng: Rng) -> None:
@@ -279,7 +279,7 @@ def judged_at_random(folder: Path, seed: int) -> bool:
 
 
 def test_random_robots_are_read_alike_and_their_proofs_accepted(tmp_path: Path) -> None:
-    assert sum(judged_at_random(tmp_path, seed) for seed in range(12)) > 4
+    assert sum(judged_at_random(tmp_path, seed) for seed in range(6)) > 2
 
 
 @pytest.mark.slow

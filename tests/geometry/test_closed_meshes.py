@@ -170,7 +170,7 @@ def test_closedness_is_what_counting_edges_gives() -> None:
     vertices = rng.normal(size=(5, 3))
     solid = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
     seen: Counter[bool] = Counter()
-    for _ in range(500):
+    for _ in range(200):
         extra = [rng.permutation(5)[:3].tolist() for _ in range(rng.integers(0, 3))]
         triangles = solid[: rng.integers(3, 5)] + extra
         faces = {frozenset(t): t for t in triangles}
@@ -184,7 +184,7 @@ def test_closedness_is_what_counting_edges_gives() -> None:
         else:  # what is given in both senses must end on others besides
             assert found.closed in ({even, True} if balanced else {even})
         seen[found.closed] += 1
-    assert min(seen[True], seen[False]) > 20
+    assert min(seen[True], seen[False]) > 10
 
 
 def border(triangles: list[list[int]], *, signed: bool = True) -> set[frozenset[int]]:
@@ -235,9 +235,9 @@ GROUPS = pytest.mark.parametrize(
 
 @GROUPS
 def test_random_meshes(faults: tuple[Callable[..., None], ...]) -> None:
-    seen = sum((hold_to_truth(seed, faults) for seed in range(60)), Counter())
-    assert seen["in a solid", Side.INSIDE] > 10
-    assert seen["outside", Side.OUTSIDE] > 50
+    seen = sum((hold_to_truth(seed, faults) for seed in range(25)), Counter())
+    assert seen["in a solid", Side.INSIDE] > 5
+    assert seen["outside", Side.OUTSIDE] > 20
 
 
 @pytest.mark.slow

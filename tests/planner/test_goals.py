@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from some_slow import few_of
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
@@ -69,7 +70,7 @@ def bent(*turns: float) -> np.ndarray:
     return joints
 
 
-@pytest.mark.parametrize("strategy", ["fewest", "clearest", "sturdiest"])
+@pytest.mark.parametrize("strategy", few_of(["fewest", "clearest", "sturdiest"], 2))
 def test_the_tip_is_brought_through_a_window_to_its_goal(strategy: str) -> None:
     goal = np.array([1.4, 0.1, 0.15])
     told = planned(to(Posture(goal), *wall(0.12)), strategy).plan.trajectory
@@ -79,7 +80,11 @@ def test_the_tip_is_brought_through_a_window_to_its_goal(strategy: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "turns", [(0.4, 0.0, 0.3, 0.2), (0.1, -0.5, 0.0, 0.5, 0.5, 0.0)]
+    "turns",
+    [
+        (0.4, 0.0, 0.3, 0.2),
+        pytest.param((0.1, -0.5, 0.0, 0.5, 0.5, 0.0), marks=pytest.mark.slow),
+    ],
 )
 def test_joint_values_are_come_to_from_straight_and_back(
     turns: tuple[float, ...],

@@ -32,7 +32,7 @@ def report(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Watched:
     path = tmp_path_factory.mktemp("view") / "report.html"
     judged = replace(judged, problem=turned)
     write_report(path, judged, verification_file(judged, made_up.RECORD))
-    options = {"viewport": {"width": 900, "height": 700}, "reduced_motion": "reduce"}
+    options = {"viewport": {"width": 720, "height": 560}, "reduced_motion": "reduce"}
     watched = Watched(browser, path.as_uri(), **options)
     watched.page.wait_for_function("window.vdsm && window.vdsm.view")
     return watched
@@ -63,7 +63,7 @@ def test_a_side_view_is_a_parallel_projection_along_an_axis_of_the_arm(
     np.testing.assert_allclose(seen, expected, atol=0.02)
 
 
-@pytest.mark.parametrize("size", [(900, 700), (420, 800), (1500, 420)])
+@pytest.mark.parametrize("size", [(720, 560), (360, 680), (1200, 340)])
 def test_every_look_shows_the_whole_motion_as_large_as_it_fits(
     report: Watched, size: tuple[int, int]
 ) -> None:
@@ -84,7 +84,7 @@ def test_every_look_shows_the_whole_motion_as_large_as_it_fits(
         if name != "overview":
             shares = np.ptp(spots, axis=0) / [box["width"], box["height"]]
             assert shares.max() > 0.8, name
-    page.set_viewport_size({"width": 900, "height": 700})
+    page.set_viewport_size({"width": 720, "height": 560})
 
 
 def test_the_view_from_the_tip_looks_along_the_last_link(report: Watched) -> None:
@@ -341,7 +341,7 @@ def test_a_page_without_a_plan_shows_where_the_search_ended(
     error = NoPlanFound("in vain", Reached("drew 1 m", 1.25, 3, "ball"))
     run = "fewest", made_up.RECORD
     write_no_plan(path, made_up.problem(), error, *run)
-    watched = Watched(browser, path.as_uri(), viewport={"width": 900, "height": 900})
+    watched = Watched(browser, path.as_uri())
     page = watched.page
     page.wait_for_function("window.vdsm && window.vdsm.view")
     colours = page.evaluate(
@@ -370,7 +370,7 @@ def test_a_scene_without_obstacles_and_a_motion_of_one_row_have_a_page(
     judged = replace(judged, approaches=())
     path = tmp_path / "report.html"
     write_report(path, judged, verification_file(judged, made_up.RECORD))
-    watched = Watched(browser, path.as_uri(), viewport={"width": 900, "height": 700})
+    watched = Watched(browser, path.as_uri())
     page = watched.page
     page.wait_for_function("window.vdsm && window.vdsm.view")
     page.locator("[data-look=side]").click()

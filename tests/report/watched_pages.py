@@ -32,7 +32,8 @@ class Watched:
     """A page whose requests and errors are written down."""
 
     def __init__(self, browser: Any, address: str, **options: Any) -> None:
-        self.page = browser.new_page(**options)
+        small = {"viewport": {"width": 480, "height": 360}}
+        self.page = browser.new_page(**small | options)
         OPENED.append(self.page)
         self.requests: list[str] = []
         self.errors: list[str] = []

@@ -294,11 +294,12 @@ APART = ELL + np.repeat([[0.0], [0.5]], 2, axis=0)
 
 
 @pytest.mark.parametrize(
-    ("parts", "solid"), [(2, None), (12, None), (256, None), (256, False)]
+    ("boxes", "parts", "solid"),
+    [(ELL, 2, None), (APART, 12, None), (ELL, 256, None), (APART, 256, False)],
+    ids=["ell-2", "apart-12", "ell-256", "apart-256-surface"],
 )
-@pytest.mark.parametrize("boxes", [ELL, APART], ids=["ell", "apart"])
 def test_hulls_of_a_mesh_hold_its_inside(
-    parts: int, boxes: FloatArray, solid: bool | None
+    boxes: FloatArray, parts: int, solid: bool | None
 ) -> None:
     """By package and checker: points inside of boxes lie in one of the hulls.
 

@@ -118,7 +118,7 @@ def test_coal_measures_every_approach_of_all_that_the_arm_has(tmp_path: Path) ->
     feed, tool = {"length": 0.3, "radius": 0.04}, {"length": 0.1, "radius": 0.01}
     arm = {"bodies": [CAMERA], "feed": feed, "tool": tool}
     rng, seen = np.random.default_rng(2), set()
-    for obstacles in 6 * [[post, rack, moving], []]:
+    for obstacles in 3 * [[post, rack, moving], []]:
         problem = read_problem(problem_in(tmp_path, arm, obstacles))
         q, none = rng.uniform(-1.5, 1.5, (3, 7)) * [0.03, *6 * [1]], np.zeros(3)
         motion = Trajectory(

@@ -164,9 +164,9 @@ def hold_random(folder: Path, seed: int) -> tuple[str, str]:
 
 
 def test_planner_verifier_and_checker_hold_to_the_truth(tmp_path: Path) -> None:
-    seen = Counter(hold_random(tmp_path, seed) for seed in range(24))
-    assert seen["inside", "refuted"] >= 5
-    assert seen["outside", "certified"] >= 5
+    seen = Counter(hold_random(tmp_path, seed) for seed in range(12))
+    assert seen["inside", "refuted"] >= 2
+    assert seen["outside", "certified"] >= 2
 
 
 @pytest.mark.slow

@@ -206,7 +206,7 @@ def no_errors(queries: int, seed: int, processes: int = 1) -> None:
 
 
 def test_random_queries_are_judged_rightly() -> None:
-    no_errors(15_000, 11)
+    no_errors(5_000, 11)
 
 
 @pytest.mark.slow

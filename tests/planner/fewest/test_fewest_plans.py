@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
+from some_slow import few_of
 
 from vdsm_pin.arm.kinematics import joint_centres, link_angles
 from vdsm_pin.arm.manipulator import built_in
@@ -226,7 +227,7 @@ def test_an_arm_that_starts_bent_starts_there() -> None:
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(("name", "gain"), [("obs1", 0.02), ("obs3", 0.3)])
+@pytest.mark.parametrize(("name", "gain"), few_of([("obs1", 0.02), ("obs3", 0.3)], 1))
 def test_clearest_keeps_much_more_clearance_and_survives_larger_joint_errors(
     name: str, gain: float
 ) -> None:

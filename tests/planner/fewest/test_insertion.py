@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes_for_fewest import problem
+from some_slow import few_of
 
 from benchmarks.hrm2000.curves import (
     Bend,
@@ -160,7 +161,7 @@ def test_points_along_a_way_are_even_and_keep_its_ends() -> None:
     assert len(resampled(route[:2], 0.1)) == 1
 
 
-@pytest.mark.parametrize("half", [0.085, 0.075, 0.07])
+@pytest.mark.parametrize("half", few_of([0.07, 0.085, 0.075], 1))
 def test_the_tip_finds_windows_and_no_way_where_they_are_shut(half: float) -> None:
     task = two_windows(half)
     goal = task.path.points[0]
@@ -427,16 +428,16 @@ def test_knees_of_an_arm_whose_base_is_fixed_are_taken_away() -> None:
     """Many small bends become few; base and tips stay where they are."""
     arm = replace(ARM, base_range=(0.0, 0.0))
     task = replace(problem(points=LOOP, start=START), manipulator=arm)
-    size = np.linspace(0.5, 1.0, 9)[:, None]
+    size = np.linspace(0.5, 1.0, 5)[:, None]
     alpha, theta = size * np.full(8, 0.2), size * np.linspace(-0.1, 0.2, 8)
-    centres = joint_centres(arm, np.zeros(9), alpha, theta)
+    centres = joint_centres(arm, np.zeros(5), alpha, theta)
     corners = Corners(
-        centres[:, -1], coordinates(arm, centres, directed=True), np.arange(9.0),
-        np.ones(8, dtype=np.bool_), np.full((8, 2), -1),
+        centres[:, -1], coordinates(arm, centres, directed=True), np.arange(5.0),
+        np.ones(4, dtype=np.bool_), np.full((4, 2), -1),
     )  # fmt: skip
     judge = judge_of(task)
     fewer = sparser(judge, corners)
-    assert judge.clear(fewer.pick(np.arange(8))).all()
+    assert judge.clear(fewer.pick(np.arange(4))).all()
     np.testing.assert_array_equal(fewer.tips, corners.tips)
     placed = standing(arm, fewer.tips, fewer.offsets)
     np.testing.assert_allclose(placed[:, 0], 0.0, atol=1e-12)
@@ -444,13 +445,12 @@ def test_knees_of_an_arm_whose_base_is_fixed_are_taken_away() -> None:
     assert judge.look(fewer.tips[1:], fewer.offsets[1:])[1].max() <= 4
 
 
-@pytest.mark.parametrize("half", [0.09, 0.075])
+@pytest.mark.parametrize("half", few_of([0.09, 0.075], 1))
 def test_two_windows_are_passed_and_the_same_plan_comes_again(half: float) -> None:
     task = two_windows(half)
     one = plan_and_judge(task)
-    if half == 0.09:  # the other one takes four times as long
-        two = plan_fewest(task, link_clearance(task), 0.0)
-        np.testing.assert_array_equal(one.trajectory.joints, two.trajectory.joints)
+    two = plan_fewest(task, link_clearance(task), 0.0)
+    np.testing.assert_array_equal(one.trajectory.joints, two.trajectory.joints)
 
 
 def test_an_arm_bent_through_two_windows_goes_on_from_where_it_is() -> None:
