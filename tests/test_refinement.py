@@ -139,7 +139,7 @@ def off_by(error: float) -> type[CoalArm]:
     class Lying(CoalArm):
         def measured(self, *words: Any) -> CoalDistances:
             found = super().measured(*words)
-            off = np.where(self.pairs.of_obstacle[found.pair], error, 0.0)
+            off = np.where(self.pairs.other[found.pair] >= self.pairs.n_own, error, 0.0)
             return replace(found, distance=found.distance + off)
 
     return Lying

@@ -351,11 +351,12 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
         replace(problem(), required_clearance=0.5),
     )
     pairs = CoalPairs(asked)
+    of_obstacles = np.flatnonzero(pairs.other >= pairs.n_own)
     parts, expected = [], dict[tuple[int, int], tuple[Any, ...]]()
     for part in range(3):
         n = 60
         gaps = rng.choice([-0.2, 0.0, 0.1, 0.3, 0.5, 0.7, -np.inf], n)
-        pair, points = rng.integers(0, pairs.one.size, n), rng.normal(size=(2, n, 3))
+        pair, points = rng.choice(of_obstacles, n), rng.normal(size=(2, n, 3))
         points[1, ::7] = points[0, ::7]
         moments, unknown = np.arange(n) + n * part, np.zeros(n)
         parts.append(CoalDistances(
@@ -363,7 +364,7 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
         ))  # fmt: skip
         for k in range(n):
             other = int(pairs.other[pair[k]]) - pairs.n_own
-            if other < 0 or not (np.isfinite(gaps[k]) and gaps[k] < 0.5):
+            if not (np.isfinite(gaps[k]) and gaps[k] < 0.5):
                 continue
             key = min(int(pairs.one[pair[k]]) + 1, ARM.n_links), other
             if key not in expected or gaps[k] < expected[key][1]:
@@ -376,7 +377,7 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
         return parts
 
     arm = SimpleNamespace(near=near, pairs=pairs, problem=asked)
-    monkeypatch.setattr(coal_missing, "CoalArm", lambda *_: arm)
+    monkeypatch.setattr(coal_missing, "CoalArm", lambda *_, **__: arm)
     blank: Any = None
     found = coal_missing.coal_missing(blank, asked, blank)
     assert [(one.link, one.obstacle) for one in found] == sorted(expected)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -98,20 +97,13 @@ def trajectory_of(n: int, seed: int = 1, size: float = 0.3) -> Trajectory:
     return Trajectory(np.zeros(n), np.zeros(n), rng.uniform(-0.5, 0.5, n), alpha, theta)
 
 
-def of_obstacles(problem: PlanningProblem) -> CoalArm:
-    """The arm as Coal has it, its links not held apart."""
-    links = combinations(HRM8.axis_names, 2)
-    arm = replace(HRM8, ignore_pairs=tuple(links))
-    return CoalArm(ROBOT, replace(problem, manipulator=arm))
-
-
 @pytest.mark.parametrize("shape", SHAPES)
 def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
     """Every (row, link, obstacle), near and far, apart and through each other."""
     rng = np.random.default_rng(SHAPES.index(shape))
     three = [replace(obstacle_of(shape, rng), name=f"number {k}") for k in range(3)]
     problem = problem_with(*three)
-    found = list(of_obstacles(problem).near(trajectory_of(25), np.inf))
+    found = list(CoalArm(ROBOT, problem, links=False).near(trajectory_of(25), np.inf))
     assert sum(chunk.moment.size for chunk in found) == 25 * 8 * 3
     for chunk in found:
         assert chunk.disagreement.max() < 2e-7
@@ -125,19 +117,23 @@ def test_culling_skips_only_what_is_far(shape: str) -> None:
     obstacle = obstacle_of(shape, np.random.default_rng(10 + SHAPES.index(shape)))
     problem, trajectory = problem_with(obstacle), trajectory_of(60)
     reach = coal_reach(problem)
-    arm = of_obstacles(problem)
+    arm = CoalArm(ROBOT, problem, links=False)
+
+    def link(chunk: CoalDistances) -> list[int]:
+        return arm.pairs.one[chunk.pair].tolist()
+
     full = list(arm.near(trajectory, np.inf))
     culled = list(arm.near(trajectory, HRM8.most_radius))
     near = {
         (s, i)
         for chunk in full
-        for s, i, d in zip(chunk.moment, chunk.pair, chunk.distance, strict=True)
+        for s, i, d in zip(chunk.moment, link(chunk), chunk.distance, strict=True)
         if d <= reach
     }
     seen = {
         (s, i)
         for chunk in culled
-        for s, i in zip(chunk.moment, chunk.pair, strict=True)
+        for s, i in zip(chunk.moment, link(chunk), strict=True)
     }
     assert near <= seen
     assert {i for _, i in seen} == set(range(8)), "every pair at least once"
@@ -151,11 +147,12 @@ def test_rows_close_to_each_other_are_seen_once(
     still = np.zeros((n, 8))
     along = np.concatenate([np.linspace(0.0, shift, n - 1000), np.full(1000, shift)])
     motion = Trajectory(np.zeros(n), np.zeros(n), along, still, still)
-    arm, room = of_obstacles(ball_near_link_4(0.03)), HRM8.most_radius
+    arm, room = CoalArm(ROBOT, ball_near_link_4(0.03), links=False), HRM8.most_radius
+    of_link_4 = arm.pairs.one == 3
 
     def rows() -> list[int]:
         found = arm.near(motion, room, travel)
-        near = np.concatenate([chunk.moment[chunk.pair == 3] for chunk in found])
+        near = np.concatenate([one.moment[of_link_4[one.pair]] for one in found])
         return near.astype(int).tolist()
 
     seen = rows()
@@ -165,7 +162,7 @@ def test_rows_close_to_each_other_are_seen_once(
     monkeypatch.setattr("vdsm_pin.verification.coal_arm.CHUNK_BOUNDS", 800)
     assert rows() == seen, "in parts or at once"
     everything = list(arm.near(motion, room))
-    assert sum(int((chunk.pair == 3).sum()) for chunk in everything) == n
+    assert sum(int(of_link_4[chunk.pair].sum()) for chunk in everything) == n
 
 
 def test_verdict_and_count_of_an_honest_scene() -> None:
@@ -282,7 +279,7 @@ def test_poses_come_from_pinocchio_and_match_the_centres() -> None:
     for i in range(8):
         outward = centres[0, i] + np.array([0.0, 0.0, 5.0])
         problem = problem_with(solids.Sphere("far", outward, 0.1))
-        (chunk,) = of_obstacles(problem).near(trajectory, np.inf)
+        (chunk,) = CoalArm(ROBOT, problem, links=False).near(trajectory, np.inf)
         expected = np.linalg.norm(
             centres[0, :-1]
             + _nearest(centres[0, :-1], centres[0, 1:], outward)[:, None]

@@ -86,6 +86,7 @@ class CoalArm:
         robot: The arm in Pinocchio and Coal.
         problem: Arm and scene.
         deadline: When to give up making shapes.
+        links: Whether links near links are looked for, not near obstacles alone.
 
     Raises:
         OutOfTime: If the time is over.
@@ -93,24 +94,30 @@ class CoalArm:
     """
 
     def __init__(
-        self, robot: RobotModel, problem: PlanningProblem, deadline: Deadline = NO_LIMIT
+        self,
+        robot: RobotModel,
+        problem: PlanningProblem,
+        deadline: Deadline = NO_LIMIT,
+        *,
+        links: bool = True,
     ) -> None:
         self.robot, self.problem, self.pairs = robot, problem, CoalPairs(problem)
         self._shapes = arm_shapes(robot, problem, deadline)
         self._radii = robot.manipulator.axis_radii
         # Partners with coarse bounds: obstacles at rest, then links and tool.
         moves = [isinstance(one, Moving) for one in problem.scene.obstacles]
-        at_rest = (
-            replace(problem, scene=problem.scene.at_rest) if any(moves) else problem
-        )
-        self._pieces = at_rest.packed_obstacles  # else what the problem keeps packed
-        self._n_rest, n_axes = moves.count(False), self._radii.size
+        still = problem  # with what it keeps packed
+        if any(moves):
+            still = replace(problem, scene=problem.scene.at_rest)
+        self._pieces, self._n_rest = still.packed_obstacles, moves.count(False)
+        n_axes, n_own = self._radii.size, self.pairs.n_own
+        n_columns = self._n_rest + links * n_axes
         columns = np.full(len(self.pairs.names), -1)
-        columns[:n_axes] = self._n_rest + np.arange(n_axes)
-        columns[self.pairs.n_own :][~np.array(moves, bool)] = np.arange(self._n_rest)
+        columns[: links * n_axes] = np.arange(self._n_rest, n_columns)
+        columns[n_own:][~np.array(moves, bool)] = np.arange(self._n_rest)
         of_link = self.pairs.one < n_axes
         self._column = np.where(of_link, columns[self.pairs.other], -1)
-        self._number = np.full((n_axes, self._n_rest + n_axes), -1)
+        self._number = np.full((n_axes, n_columns), -1)
         near = np.flatnonzero(self._column >= 0)
         self._number[self.pairs.one[near], self._column[near]] = near
 
@@ -121,7 +128,7 @@ class CoalArm:
         travel: float = 0.0,
         deadline: Deadline = NO_LIMIT,
     ) -> Iterator[CoalDistances]:
-        """Measure links near obstacles at rest or links, then each pair not yet seen.
+        """Measure links near what they are looked for at, then each such pair unseen.
 
         Args:
             trajectory: The rows.
@@ -213,11 +220,12 @@ class CoalArm:
 
     def _bounds(self, axes: FloatArray) -> FloatArray:
         """Lower bounds of the clearance of links and tool, (n, n_axes, n_columns)."""
-        gaps = link_gaps(axes, self._radii)
-        if not self._n_rest:
-            return gaps
-        coarse = coarse_bounds(self._pieces, axes, self._radii)
-        return np.concatenate([coarse, gaps], axis=2)
+        found = []
+        if self._n_rest:
+            found.append(coarse_bounds(self._pieces, axes, self._radii))
+        if self._number.shape[1] > self._n_rest:
+            found.append(link_gaps(axes, self._radii))
+        return np.concatenate(found, axis=2)
 
     def _brackets(
         self, axes: FloatArray, sides: Sides

@@ -161,7 +161,8 @@ def check_coal(
     )  # fmt: skip
     for found in chain(log.answers(arm, trajectory), _kept(rows, arm, proved, log)):
         # Where there is no number the two do not agree.
-        excess = np.where(np.isnan(found.disagreement), np.inf, found.disagreement)
+        excess = found.disagreement
+        excess[np.isnan(excess)] = np.inf
         evidence.count += excess.size
         k = int(np.argmax(excess))
         evidence.add(float(excess[k]), _words(arm, found, k), float(found.moment[k]))

@@ -65,13 +65,11 @@ def coal_missing(
     if not problem.scene.obstacles:
         return ()
     worst: dict[tuple[int, int], Missing] = {}
-    arm = CoalArm(robot, problem, deadline)
+    arm = CoalArm(robot, problem, deadline, links=False)
     room = NEAR * problem.manipulator.most_radius
     for found in arm.near(trajectory, room, deadline=deadline):
-        near = (found.distance < problem.required_clearance) & (
-            np.isfinite(found.distance) & arm.pairs.of_obstacle[found.pair]
-        )
-        for k in np.flatnonzero(near):
+        short = found.distance < problem.required_clearance
+        for k in np.flatnonzero(short & np.isfinite(found.distance)):
             one = _missing(arm, found, int(k))
             key = one.link, one.obstacle
             if key not in worst or one.distance < worst[key].distance:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.solids import Mesh, Solid
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, solid_of
@@ -54,11 +54,6 @@ class CoalPairs:
         self.covered[len(arm.axis_names) : self.n_own] = [
             isinstance(solid, Mesh) for solid in carried
         ]
-
-    @property
-    def of_obstacle(self) -> BoolArray:
-        """Which pairs are of a body and an obstacle, shape (n_pairs,)."""
-        return np.asarray(self.other >= self.n_own)
 
     def named(self, pair: int) -> tuple[str, str]:
         """The names of both bodies of a pair."""

@@ -88,12 +88,11 @@ def _checks(robot: RobotModel, found: Refinement, row: int) -> Part:
     one = plan.trajectory.part(row, row + 1)
     centres = robot.joint_centres(one.x0, one.alpha, one.theta)[0]
     error = float(np.linalg.norm(centres - plan.centres[row], axis=1).max())
-    arm, rows = CoalArm(robot, problem), []
+    arm, rows = CoalArm(robot, problem, links=False), []
     for seen in arm.near(one, np.inf):
         rows += [
             (*arm.pairs.named(pair), mm(seen.distance[k]), mm(low), mm(seen.upper[k]))
             for k, (pair, low) in enumerate(zip(seen.pair, seen.lower, strict=True))
-            if arm.pairs.of_obstacle[pair]
         ]
     head = ("link", "obstacle", "by Coal [mm]", "proved at least", "proved at most")
     return Part(
