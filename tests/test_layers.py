@@ -54,6 +54,7 @@ READING = {
     *("problem.scene", "problem.trajectory"),
     *("problem.error_boxes",),
     *("io.problem_file", "io.source", "io.trajectory_file", "io.mesh_file"),
+    "io.others",
     *("arm.urdf_validator", "robots.files", "robots.joint_limits", "robots.model"),
     *("robots.srdf", "robots.trajectory_files", "robots.xacro"),
 }

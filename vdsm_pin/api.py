@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from vdsm_pin.app.motions import NO_OPTIONS, Motion, MotionOptions, expect
+from vdsm_pin.app.problems import read_problem as read_problem
 from vdsm_pin.app.subjects import ProblemOrCell, Subject, subject_of
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.atomic import atomic_path
-from vdsm_pin.io.problem_file import read_problem as read_problem
 from vdsm_pin.io.trajectory_file import Interpolation
 from vdsm_pin.io.trajectory_file import write_trajectory as write_arm_trajectory
 from vdsm_pin.planner.records import Plan

@@ -308,6 +308,7 @@ class OracleWriter:
             "pairs": pairs,
             "pieces": self.pieces(),
             "joined": {},
+            "links": {},
         }
 
     def lines(self) -> list[Any]:

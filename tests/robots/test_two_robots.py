@@ -19,10 +19,11 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.report.page_data import report_data
 from vdsm_pin.report.robot_facts import robot_facts
 from vdsm_pin.report.scene_rows import scene_words
+from vdsm_pin.robots.by_itself import POSES
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
-from vdsm_pin.robots.files import HULLS, MeshCover, read_cell_file
-from vdsm_pin.robots.judgement import POSES, verify_robot
+from vdsm_pin.robots.files import HULLS, MeshCover
+from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.trajectory_files import read_path
@@ -172,7 +173,8 @@ def test_certificate_is_of_both_trajectories(tmp_path: Path) -> None:
 
     def outcome(*, told: bool = True) -> Outcome:
         if told:
-            source = read_cell_file(tmp_path / "left.yaml").source((), ())
+            source = read_cell(tmp_path / "left.yaml").source
+            assert source is not None
             hashes = Hashes(source.sha256, sha256_of_file(file))
             write_robot_certificate(proof, found, hashes)
         return check_certificate(proof, tmp_path / "left.yaml", file)
@@ -187,7 +189,8 @@ def test_certificate_is_of_both_trajectories(tmp_path: Path) -> None:
     write(tmp_path, "right.csv", rows_text(q["right"], TIMES["right"] - 1.0))
     assert not outcome().accepted
     write(tmp_path, "right.csv", "turn_rad\n0\n1\n")
-    assert "no times" in outcome().reason
+    with pytest.raises(InvalidFile, match="no times"):
+        outcome(told=False)
 
 
 def test_another_robot_moves_by_a_topic_of_a_bag(tmp_path: Path) -> None:
@@ -228,8 +231,9 @@ def test_another_robot_moves_by_a_topic_of_a_bag(tmp_path: Path) -> None:
 
 def test_what_is_wrong_with_another_robot_is_said(tmp_path: Path) -> None:
     cell, _ = two(tmp_path, {"left": np.zeros(3), "right": np.zeros(3)})
-    (other,) = cell.others
-    assert all(note.startswith("right: ") for note in other.notes)
+    (other,) = cell.scene.carriers
+    assert other.itself.notes
+    assert all(note.startswith("right: ") for note in other.itself.notes)
     write(tmp_path, "right.csv", "turn_rad\n0\n1\n")
     with pytest.raises(InvalidFile, match=r"'right\.csv' has no times, which it needs"):
         read_cell(tmp_path / "left.yaml")

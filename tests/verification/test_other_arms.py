@@ -8,7 +8,7 @@ import pytest
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io import other_arms
+from vdsm_pin.io import others
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -222,13 +222,13 @@ def test_what_is_judged_is_what_the_hash_is_of(
 ) -> None:
     """The file is another one as soon as it was read: neither sees that."""
     path, _ = write_pair(tmp_path, 2)
-    whole, read = read_problem(path), other_arms.read_trajectory_text
+    whole, read = read_problem(path), others.read_trajectory_text
 
     def changed(file: Path, *more: Any) -> Trajectory:
         file.write_text("")
         return read(file, *more)
 
-    monkeypatch.setattr(other_arms, "read_trajectory_text", changed)
+    monkeypatch.setattr(others, "read_trajectory_text", changed)
     found = read_problem(path)
     assert (tmp_path / "t1.csv").read_text() == ""
     assert found.sha256 == whole.sha256

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from vdsm_pin.app.arm_subject import ArmSubject
 from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions
-from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
+from vdsm_pin.app.problems import read_problem
+from vdsm_pin.io.problem_file import ProblemOfRobot
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.brackets import ClearanceSink

@@ -14,9 +14,9 @@ from threading import Lock
 from typing import Final
 from urllib.parse import parse_qs, urlsplit
 
+from vdsm_pin.app.problems import read_problem
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text
-from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory

@@ -69,12 +69,11 @@ class Arm:
     ) -> None:
         self.problem, self.arm = problem, problem.manipulator
         belongs(header, "errors", problem.sha256, sha256_of_file(trajectory))
-        joined = header["interpolation"]
-        known = joined in ("linear", "cubic", "quintic")
-        claim(known, f"interpolation is {joined}, expected linear, cubic or quintic")
+        joined, known = header["interpolation"], ("linear", "cubic", "quintic")
+        claim(joined in known, f"interpolation is {joined}, expected one of {known}")
         rows = read_trajectory(trajectory, self.arm, joined)
         self.lengths = self.arm.link_lengths.tolist()
-        self.solids = [solid(one) for one in problem.scene.obstacles]
+        self.solids = [solid(x, header["links"]) for x in problem.scene.obstacles]
         self.meshes = {s.name: s for s in self.solids if isinstance(s, Mesh)}
         stated, least = header["errors"], {"joints_rad": self._asked()}
         self.grown = grown(stated, problem.errors, least, self.solids)
@@ -83,7 +82,7 @@ class Arm:
         own = Branch(rows.joints, rows.times, rates=rates)
         self.own = Tree(joints), Path(own)
         self.tree, self.path, self.frames = beside(own, joints, problem.scene.obstacles)
-        self._cover(dict(header["pieces"]), header["joined"])
+        self._cover(header)
         self.pairs = [*self._pairs()]
         self.rows = Rows(self, rows)
         self.notes = [note for mesh in self.meshes.values() for note in mesh.notes()]
@@ -97,14 +96,14 @@ class Arm:
         each += [0.0] * (2 * len(self.lengths) - len(each))
         return [max(asked.joint, e) for e in each]
 
-    def _cover(self, pieces: dict[str, Any], joined: dict[str, Any]) -> None:
+    def _cover(self, header: Any) -> None:
         """Take the bodies, and the pieces that cover them and the obstacles."""
-        self.bodies = [*own_bodies(self.arm)]
+        self.bodies, pieces = [*own_bodies(self.arm)], {**header["pieces"]}
         for carried in self.arm.bodies:
             parts = solid(carried.solid).parts(pieces.pop(carried.solid.name, None))
             frame = frame_of(carried.link)
             self.bodies += [Body(frame, part, own=False) for part in parts]
-        cover(self.solids, pieces, joined)
+        cover(self.solids, {**header, "pieces": pieces})
 
     def _pairs(self) -> Iterator[Pair]:
         """What the problem holds apart, in order."""

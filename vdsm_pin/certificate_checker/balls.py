@@ -42,7 +42,7 @@ def number(value: Any) -> float:
 
 def belongs(header: Any, keys: str, problem: str, trajectory: str) -> None:
     """Reject a header with other keys, or of other files than those of two hashes."""
-    wanted = {*f"{COMMON} interpolation pairs pieces joined {keys}".split()}
+    wanted = {*f"{COMMON} interpolation pairs pieces joined links {keys}".split()}
     claim(set(header) == wanted, f"has other keys than {sorted(wanted)}")
     for kind, sha256 in (("problem", problem), ("trajectory", trajectory)):
         claim(header[f"{kind}_sha256"] == sha256, f"is of another {kind} file")

@@ -10,11 +10,10 @@ line.
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from flint import ctx
@@ -22,7 +21,7 @@ from flint import ctx
 from vdsm_pin.certificate_checker.arm import Arm
 from vdsm_pin.certificate_checker.balls import Rejected, claim
 from vdsm_pin.certificate_checker.claims import Clearances
-from vdsm_pin.certificate_checker.robot import Robot
+from vdsm_pin.certificate_checker.robot import Robot, other_robot
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
 from vdsm_pin.io.source import bounded_lines, check_is_file_or_bag, check_unchanged
@@ -40,8 +39,7 @@ DAMAGE: Final = (
 """What a file of another make raises where it is taken for a certificate."""
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What a check found.
 
     Args:
@@ -95,13 +93,8 @@ def _unique(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
 class _Run:
     """One run of the checker; `place` says where it is."""
 
-    def __init__(self, problem: Path, trajectory: Path) -> None:
-        self.asked: Callable[..., Arm | Robot]
-        try:
-            self.asked = partial(Arm, read_problem(problem))
-        except ProblemOfRobot:
-            self.asked = partial(Robot, read_cell_file(problem))
-        self.trajectory, self.judged = trajectory, ""
+    def __init__(self) -> None:
+        self.judged = ""
         self.parts = list[Any]()  # those that are checked, and where they are
         self.notes = list[str]()
 
@@ -109,13 +102,19 @@ class _Run:
     def place(self) -> str:
         return self.parts[-1].place if self.parts else "header"
 
-    def check(self, lines: Iterator[dict[str, Any]]) -> None:
+    def check(
+        self, lines: Iterator[dict[str, Any]], problem: Path, trajectory: Path
+    ) -> None:
+        try:
+            asks: Any = partial(Arm, read_problem(problem, other_robot))
+        except ProblemOfRobot:
+            asks = partial(Robot, read_cell_file(problem))
         header = next(lines, {})
         version, by = header.get("vdsm_certificate"), header.get("versions", {})
         told = f"is of version {version}, as vdsm-pin {by.get('vdsm_pin')} writes and "
         claim(version == VERSION, told + f"reads it; expected {VERSION}")
-        asked = self.asked(header, self.trajectory)
-        check_unchanged(self.trajectory, header["trajectory_sha256"])
+        asked = asks(header, trajectory)
+        check_unchanged(trajectory, header["trajectory_sha256"])
         expected = [pair.names for pair in asked.pairs]
         claim(header["pairs"] == expected, "the pairs are not those of the problem")
         self.parts.append(Clearances(asked.tree, asked.path, asked.pairs))
@@ -140,18 +139,17 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
         InvalidFile: If one of the files is not what its format says.
     """
     check_is_file_or_bag(trajectory)
-    run, reason = _Run(problem, trajectory), ""
+    run, reason = _Run(), ""
     with ctx.workprec(PRECISION), np.errstate(all="ignore"):
         try:
-            run.check(_lines(certificate))
+            run.check(_lines(certificate), problem, trajectory)
         except Rejected as error:
             reason = printable(f"{run.place}: {error}")
         except DAMAGE as error:
             text = f"cannot be read as a certificate: {error}"
             raise InvalidFile(file=certificate, where=run.place, problem=text) from None
-    first = run.parts[0] if run.parts else None
-    counts = (first.n_intervals, first.n_claims) if first else (0, 0)
-    return Outcome(run.judged, reason, counts[0], counts[1], tuple(run.notes))
+    counts = [(one.n_intervals, one.n_claims) for one in run.parts[:1]] or [(0, 0)]
+    return Outcome(run.judged, reason, *counts[0], tuple(run.notes))
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -171,8 +169,7 @@ def main(arguments: Sequence[str]) -> int:
         sys.stderr.write(f"vdsm: {little}{error}".rstrip("; ") + "\n")
         return 2
     found = f"{outcome.n_intervals} intervals, {outcome.n_claims} clearances"
-    verdict = "accepted" if outcome.accepted else "rejected"
-    told = outcome.judged if outcome.accepted else outcome.reason
     notes = "; ".join([f"{found} recomputed", *outcome.notes])
-    sys.stdout.write(f"{verdict}: {told} ({notes})\n")
+    told = outcome.reason and f"rejected: {outcome.reason}"
+    sys.stdout.write(f"{told or f'accepted: {outcome.judged}'} ({notes})\n")
     return 0 if outcome.accepted else 1

@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from itertools import combinations, product
 from pathlib import Path as File
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from flint import arb, arb_mat
@@ -25,15 +25,15 @@ from vdsm_pin.certificate_checker.solids import (
     Solid,
     cover,
     hulls,
-    named_parts,
     solid,
 )
 from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose, Tree
 from vdsm_pin.io.mesh_file import read_mesh
-from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.io.others import OtherFile, Others
+from vdsm_pin.io.source import files_in, sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.scene import Carrier, Moving
-from vdsm_pin.robots.files import CellFile, RobotFiles, find_mesh
+from vdsm_pin.problem.scene import Moving
+from vdsm_pin.robots.files import CellFile, RobotFiles, files_of_robot, find_mesh
 from vdsm_pin.robots.joint_limits import Limits, narrowed, read_limits, stated_limits
 from vdsm_pin.robots.model import RobotJoint
 from vdsm_pin.robots.srdf import Srdf, end
@@ -77,10 +77,14 @@ def placed(element: ET.Element) -> list[list[Ball]]:
 class Model:
     """The joints of a URDF as a tree, which of them a trajectory moves, and its links.
 
+    Of another robot it carries obstacles, along its `path`.
+
     Args:
         files: Of the robot.
         pose: T_world_root, where the root link hangs on the world, shape (4, 4); [m].
     """
+
+    reach = 0.0
 
     def __init__(self, files: RobotFiles, pose: Any) -> None:
         self.files, self.lock, self.moved = files, files.lock, list[RobotJoint]()
@@ -118,6 +122,7 @@ class Model:
             own = numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
             frame = self._hang(parent, name, kind, placed(joint), own)
             self.frames[end(joint, "child")] = frame
+        self.tree = Tree(self.joints)
         self.moved, self.notes = narrowed(self.moved, self.values, document, given)
 
     def _own(self, name: str, kind: str, limits: Limits) -> None:
@@ -195,22 +200,12 @@ class Model:
         claim((np.diff(branch.times) > 0.0).all(), "times do not rise")
         return branch
 
-    def links(self, told: Mapping[str, Any], whose: str = "") -> dict[str, Any]:
-        """Frame and solids of each link that has any, by its name in the header.
+    def links(self, whose: str = "") -> "list[Link]":
+        """Those that have solids; `whose` is what their names begin with."""
+        own = [(x, x.attrib["name"]) for x in self.document.findall("link[collision]")]
+        return [Link(whose + name, self.frames[name], x, self) for x, name in own]
 
-        Args:
-            told: The header's links.
-            whose: What their names begin with there.
-        """
-        found = {}
-        for link in self.document.findall("link"):
-            name, frame = whose + link.attrib["name"], self.frames[link.attrib["name"]]
-            covers = told.get(name, {"meshes": []})["meshes"]
-            if parts := named_parts([*self._solids(link, name, [*covers])]):
-                found[name] = frame, parts
-        return found
-
-    def _solids(self, link: ET.Element, name: str, covers: Any) -> Iterator[Solid]:
+    def solids(self, link: ET.Element, name: str, covers: Any) -> Iterator[Solid]:
         """The convex pieces of a link; of each mesh as the certificate has it."""
         for collision in link.findall("collision"):
             place = np.array([[*map(float, row)] for row in placed(collision)])
@@ -252,6 +247,39 @@ class Model:
             yield Solid(name, [points], far)
 
 
+class Link(NamedTuple):
+    """A link with solids; called with a certificate's links it is made of them.
+
+    Args:
+        name: In the certificate.
+        frame: On which it rides.
+        element: In the URDF.
+        model: Whose it is.
+    """
+
+    name: str
+    frame: int
+    element: ET.Element
+    model: Model
+    reach: float = 0.0  # readers ask for it, of obstacles
+
+    def __call__(self, told: Mapping[str, Any]) -> Compound:
+        """Its convex pieces."""
+        covers = told.get(self.name, {"meshes": []})["meshes"]
+        parts = self.model.solids(self.element, self.name, [*covers])
+        return Compound(self.name, [*parts], told)
+
+
+def other_robot(one: OtherFile) -> Others:
+    """The links of another robot, as obstacles that it carries."""
+    files = files_of_robot(one.model, one.folder)
+    model: Any = Model(files, one.pose)
+    model.path = model.branch(one.trajectory, one.topic)
+    links = (Moving(x, model, x.frame) for x in model.links(f"{one.name}: "))
+    named = (*files.files, *model.more, *files_in(one.trajectory))
+    return Others((*links,), named, model.path.timed)
+
+
 class Robot:
     """What the files ask about.
 
@@ -266,51 +294,42 @@ class Robot:
     def __init__(self, file: CellFile, header: Any, trajectory: File) -> None:
         self.rows, self.place = self, "header"
         self.model = model = Model(file.robot, np.eye(4))
-        models = [Model(one.robot, one.pose) for one in file.others]
         size = float(sum(joint.lever for joint in model.joints)) or 1.0
         names = {name for name, frame in model.frames.items() if frame != 1}
-        self.scene, of_obstacles = file.scene(size, names)
-        more = (path for one in (model, *models) for path in one.more)
-        source = file.source((*more,), of_obstacles).sha256
-        belongs(header, "errors links topic", source, sha256_of_file(trajectory))
+        found = file.scene(size, names, other_robot)
+        self.scene, source = found.scene, file.source(model.more, found).sha256
+        belongs(header, "errors topic", source, sha256_of_file(trajectory))
         own, told = model.branch(trajectory, header["topic"]), header["links"]
         joined = {1: "linear", 3: "cubic", 5: "quintic"}[own.degree]
         wrong = f"interpolation is {header['interpolation']}, the file's is {joined}"
         claim(header["interpolation"] == joined, wrong)
         self.own, self.timed = Path(own), own.timed and len(own.knots) > 1
-        self.links, obstacles = model.links(told), [*self.scene.obstacles]
-        for one, files in zip(models, file.others, strict=True):
-            rides: Any = Tree(one.joints), one.branch(files.trajectory, files.topic)
-            carrier = Carrier(*rides)
-            for name, (frame, parts) in one.links(told, f"{files.name}: ").items():
-                whole: Any = Compound(name, parts, told)
-                obstacles.append(Moving(whole, carrier, frame))
-        known = {*self.links, *(one.name for one in obstacles)} >= set(told)
-        claim(known, "links without solids are told of")
-        self.tree, self.path, self.rests = beside(own, model.joints, obstacles)
+        self.links = {x.name: (x.frame, x(told)) for x in model.links()}
+        things = [solid(one, told) for one in self.scene.obstacles]
+        cover(things, header, self.links)
+        self.tree, self.path, self.rests = beside(
+            own, model.joints, self.scene.obstacles
+        )
         self.notes = [file.robot.solids.words, f"{joined} pieces", *model.notes]
-        self.pairs = [*self._pairs(file, header, [*map(solid, obstacles)])]
+        self.pairs = [*self._pairs(file, header, things)]
 
     def _pairs(self, file: CellFile, header: Any, things: list[Any]) -> Iterator[Pair]:
         """What the problem holds apart, in order."""
-        stated, links = header["errors"], self.links
-        asked = file.errors(self.scene, {x.name for x in things})
-        cover(things, header["pieces"], header["joined"])
+        stated, links, asked = header["errors"], self.links, file.errors(self.scene)
         off = grown(stated, asked, self.model.least_errors(asked), things)
         self.model.err(stated)
         required, own = file.required
         every = zip(things, self.rests, off, strict=True)
-        for (thing, at, lost), (frame, parts) in product(every, links.values()):
-            for each in parts:
+        for (thing, at, lost), (frame, link) in product(every, links.values()):
+            for each in link.parts:
                 yield Pair(Body(frame, each), thing, at, required, lost)
         left = self.model.srdf.disabled() if self.model.srdf else {}
         pairs = [*combinations(links, 2)]
         apart = [names for names in pairs if self._held(*names, left)]
         for one, other in apart:
-            both = sorted((one, other), key=lambda name: len(links[name][1]))
-            (frame, parts), (at, whole) = (links[name] for name in both)
-            rest = Compound(both[1], whole, header["links"])  # of more parts
-            for each in parts:
+            both = (links[one], links[other])
+            (frame, link), (at, rest) = sorted(both, key=lambda x: len(x[1].parts))
+            for each in link.parts:
                 yield Pair(Body(frame, each), rest, at, own, 0.0)
         self.notes += [f"{len(pairs) - len(apart)} of {len(pairs)} link pairs left out"]
         for mesh in (one for one in things if isinstance(one, Mesh)):
@@ -333,9 +352,8 @@ class Robot:
             if isinstance(pair.solid, Mesh) and pair.body.solid in pair.solid.split:
                 pair.solid.check_outside(first[pair.rest], [pair.inner(first)])
         for k in range(self.own.size):
-            self.place, step = f"interval {k}", arb(0)
-            if self.timed:
-                step = arb(self.own.times[k + 1]) - arb(self.own.times[k])
+            self.place, ends = f"interval {k}", self.own.times[k : k + 2].tolist()
+            step = arb(ends[-1]) - arb(ends[0])
             columns = self.own.controls(k)
             for joint, points in zip(self.model.moved, columns, strict=True):
                 told = f"joint {joint.name!r} leaves its limits"
@@ -343,9 +361,9 @@ class Robot:
                 limits = joint.velocity, joint.acceleration
                 for order, most in enumerate(limits if self.timed else (), start=1):
                     told = f"joint {joint.name!r} leaves the limit of its rates"
-                    smooth = order < len(columns[0])  # else they change at once
                     points = [q / step for q in derivative(points)]  # noqa: PLW2901
-                    kept = smooth and within(points, -most, most)
+                    # Rates of straight lines change at once.
+                    kept = order < len(columns[0]) and within(points, -most, most)
                     claim(kept or most == np.inf, told)
 
 

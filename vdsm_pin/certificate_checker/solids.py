@@ -74,8 +74,7 @@ class Solid:
             if pieces is not None:
                 self.cut(pieces)
             parts = [*self.points]
-        disc = self.disc_axis, self.disc_radius
-        more = self.extent, self.radius, disc
+        more = self.extent, self.radius, (self.disc_axis, self.disc_radius)
         return named_parts([Solid(self.name, [part], *more) for part in parts])
 
     def cut(self, pieces: list[Any]) -> None:
@@ -96,12 +95,20 @@ class Solid:
         self.points = np.concatenate(self.ends[:, np.array(pieces, dtype=int)], axis=1)
 
 
-def cover(things: Sequence[Any], pieces: Any, joined: Any) -> None:
-    """Take the pieces that solids are counted in, and the corners that close meshes."""
+def cover(things: Sequence[Any], header: Any, own: Iterable[str] = ()) -> None:
+    """Take the pieces that obstacles are counted in, and the corners that close meshes.
+
+    Args:
+        things: The obstacles.
+        header: Of the certificate.
+        own: Links that it may tell of too.
+    """
     named = {one.name: one for one in things}
-    for name, order in pieces.items():
+    known = {*header["links"]} <= {*named, *own}
+    claim(known, "links without solids are told of")
+    for name, order in header["pieces"].items():
         named[name].cut(order)
-    for name, (corners, seams) in joined.items():
+    for name, (corners, seams) in header["joined"].items():
         mesh: Any = named.get(name)
         claim(isinstance(mesh, Mesh), f"{name} is no mesh: nothing is joined")
         mesh.surface.join(corners, seams)
@@ -159,22 +166,22 @@ class Compound:
 
     Args:
         name: Name in the certificate.
-        points: The solids.
+        parts: The solids, which are named by their numbers.
         told: By name the certificate's permutation of their numbers, as `order`; none
             or an empty one for 0, 1 and so on.
     """
 
-    def __init__(self, name: str, points: Sequence[Solid], told: Any) -> None:
-        order, every = told.get(name, {"order": ()})["order"], [*range(len(points))]
+    def __init__(self, name: str, parts: list[Solid], told: Any) -> None:
+        order, every = told.get(name, {"order": ()})["order"], [*range(len(parts))]
         good = sorted(order or every) == every
         claim(good, f"pieces of {name} do not make up the whole")
-        self.name, self.split = name, set[Solid]()
-        self.points: list[Solid] = [points[k] for k in [*order] or every]
-        self.normal, self.extent = None, max(one.extent for one in points)
+        self.name, self.split, self.parts = name, set[Solid](), named_parts(parts)
+        self.points: list[Solid] = [parts[k] for k in [*order] or every]
+        self.normal, self.extent = None, max(one.extent for one in parts)
 
     def support(self, n: Any, first: int, last: int) -> float:
         """Least n.x over the pieces first..last-1, for a unit n."""
-        return min([one.support(n, 0, 1) for one in self.points[first:last]])
+        return min(one.support(n, 0, 1) for one in self.points[first:last])
 
     def size(self) -> float:
         """As of a solid."""
@@ -218,12 +225,17 @@ class Mesh(Solid):
         return [note for note, holds in told.items() if holds]
 
 
-def solid(obstacle: Any) -> Any:
-    """The solid of an obstacle as it was read, in the frame that carries it."""
+def solid(obstacle: Any, told: Any = None) -> Any:
+    """The solid of an obstacle as it was read, in the frame that carries it.
+
+    Args:
+        obstacle: As it was read.
+        told: The certificate's links, of which those of other robots are made.
+    """
     if isinstance(obstacle, scene.Moving):
         obstacle = obstacle.solid
-    if isinstance(obstacle, Compound):
-        return obstacle
+    if callable(obstacle):
+        return obstacle(told)
     name = obstacle.name
     match obstacle:
         case solids.Sphere():

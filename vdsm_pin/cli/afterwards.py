@@ -53,7 +53,7 @@ def check_certificate(
 
     if any(answer):
         found = check(certificate, Path(problem), trajectory)
-        answer.tell("", accepted=found.accepted, **asdict(found))
+        answer.tell("", accepted=found.accepted, **found._asdict())
         raise typer.Exit(PASSED if found.accepted else NOT_PASSED)
     with shown(lines=False):
         step("recomputing every claim")
@@ -86,7 +86,7 @@ def simulate(
     `simulation`). Writes executed.csv, simulation.csv, simulation.json and
     simulation.html. Status 1 where the executed motion is not proved clear.
     """
-    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.app.problems import read_problem
     from vdsm_pin.simulation.folder import SimulationOrder, simulate_to_folder
     from vdsm_pin.simulation.settings import Settings, read_settings
     from vdsm_pin.simulation.terminal import show_simulation
@@ -130,7 +130,7 @@ def explain(
     every step.
     """
     from vdsm_pin.app.explanation.folder import explain_to_folder
-    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.app.problems import read_problem
 
     page, row = explain_to_folder(read_problem(problem), waypoint, out)
     answer.tell(f"waypoint {row}: wrote {page}", waypoint=int(row), page=page)

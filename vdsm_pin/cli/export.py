@@ -71,7 +71,7 @@ def export(
     """
     from vdsm_pin.app.export import ExportOrder
     from vdsm_pin.app.export import export as write
-    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.app.problems import read_problem
     from vdsm_pin.report.film import Shot, look_of
 
     shot = Shot(look_of(look), width - width % 2, height - height % 2, numbers)

@@ -45,10 +45,11 @@ def urdf(
     answer: Answer,
 ) -> None:
     """Write the URDF of an arm."""
+    from vdsm_pin.app.problems import read_problem
     from vdsm_pin.arm.manipulator import BUILT_IN, built_in
     from vdsm_pin.arm.urdf_writer import mesh_names, urdf_text
     from vdsm_pin.io.atomic import atomic_path
-    from vdsm_pin.io.problem_file import built_in_names, read_problem
+    from vdsm_pin.io.problem_file import built_in_names
     from vdsm_pin.report.folder import check_kept, check_output_file
     from vdsm_pin.report.solids import obj_text
 

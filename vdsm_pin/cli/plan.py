@@ -56,8 +56,8 @@ def plan(
     required is written, is called incomplete, and ends with status 1. Errors are added
     to those of the problem file; the plan keeps its clearances under them.
     """
+    from vdsm_pin.app.problems import read_problem
     from vdsm_pin.app.workflow import plan_to_folder
-    from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.kept import is_cold, note_planned
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan

@@ -5,7 +5,7 @@ sphere, capsule, box, convex prism and triangle are hulls.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias, overload
 
 import numpy as np
@@ -64,6 +64,15 @@ def ends_of(piece: Hull | FlatCylinder) -> FloatArray:
         return piece.points
     along = piece.half_length * piece.axis
     return np.stack([piece.centre - along, piece.centre + along])
+
+
+def placed_piece(piece: Hull | FlatCylinder, pose: FloatArray) -> Hull | FlatCylinder:
+    """A piece in another frame; `pose` is T_other_frame, shape (4, 4); [m]."""
+    turn, shift = pose[:3, :3], pose[:3, 3]
+    if isinstance(piece, Hull):
+        return Hull(frozen(piece.points @ turn.T + shift), piece.radius)
+    centre, axis = frozen(turn @ piece.centre + shift), frozen(turn @ piece.axis)
+    return replace(piece, centre=centre, axis=axis)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,13 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows, frozen
 from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
-from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls, ends_of
+from vdsm_pin.geometry.convex import (
+    FlatCylinder,
+    Hull,
+    Hulls,
+    ends_of,
+    placed_piece,
+)
 from vdsm_pin.geometry.primitives import BOX_CORNERS, NamedSolid
 
 
@@ -100,6 +106,11 @@ class ConvexCover:
 
     name: str
     pieces: tuple[Hull | FlatCylinder, ...]
+
+    def placed(self, pose: FloatArray) -> "ConvexCover":
+        """It in another frame; `pose` is T_other_frame, shape (4, 4); [m]."""
+        pieces = tuple(placed_piece(piece, pose) for piece in self.pieces)
+        return ConvexCover(self.name, pieces)
 
     @property
     def corners(self) -> FloatArray:

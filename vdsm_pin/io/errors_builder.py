@@ -1,6 +1,6 @@
 """The errors of a problem file, of an arm's or of any other robot's."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -17,7 +17,6 @@ def build_errors(
     frame: Frame,
     scene: Scene,
     document: YamlDocument,
-    links: Collection[str] = (),
 ) -> ErrorBox:
     """The errors under which every clearance is asked for.
 
@@ -26,13 +25,12 @@ def build_errors(
         frame: Its unit.
         scene: The obstacles.
         document: The file, for messages.
-        links: Names of what counts as obstacles too.
 
     Raises:
         InvalidFile: If they name an obstacle that there is not, or turn a half-space.
     """
     solids = {one.name: solid_of(one) for one in scene.obstacles}
-    _check_obstacles(model, dict.fromkeys(links) | solids, document)
+    _check_obstacles(model, solids, document)
     joint, slide = model.joint_deg, model.slide
     turns = joint if isinstance(joint, Mapping) else {}
     shifts = slide if isinstance(slide, Mapping) else {}

@@ -1,5 +1,6 @@
 """A checked problem file to a planning problem: units, frames, defaults, and sense."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,10 @@ from vdsm_pin.io.errors_builder import build_errors
 from vdsm_pin.io.errors_schema import ErrorsModel
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
-from vdsm_pin.io.other_arms import OtherArms
+from vdsm_pin.io.others import MAX_BYTES, Others
 from vdsm_pin.io.path_builder import PathBuilder, spacing_of
 from vdsm_pin.io.posture_builder import PostureBuilder
-from vdsm_pin.io.source import Digest
+from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -26,7 +27,7 @@ from vdsm_pin.problem.scaling import (
     Scaling,
     ScalingCentre,
 )
-from vdsm_pin.problem.scene import Moving, Scene
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -37,6 +38,7 @@ def build_problem(
     name: str,
     folder: Path,
     digest: Digest,
+    read_others: Callable[[Frame], Others],
 ) -> PlanningProblem:
     """The planning problem that a file describes.
 
@@ -45,6 +47,7 @@ def build_problem(
         document: The same with line numbers, for messages.
         name: Name of the problem where the file gives none.
         folder: Where relative mesh paths start.
+        read_others: Reads the other arms and robots.
         digest: Gets the bytes of the arm's URDF, if one is named, then those of the
             meshes that links carry and those of the obstacles, in file order, then
             those of the other arms and their trajectories, then those of the path's
@@ -62,8 +65,11 @@ def build_problem(
     _check_links_apart(arm, self_clearance, frame, document)
     obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)
     scene = obstacles.build_scene(model.obstacles, arm)
-    arms = OtherArms(document, frame, folder, digest)
-    scene = _joined(scene, arms.build(model.others), document)
+    others = read_others(frame)
+    for file in others.files:
+        read = others.contents.get(file)
+        digest.update(read_bytes(file, limit=MAX_BYTES) if read is None else read)
+    scene = joined(scene, others.bodies, document)
     _check_ignored(arm, scene.names, document)
     _check_ends(model, document)
     paths = PathBuilder(document, frame, arm, folder, digest)
@@ -85,12 +91,18 @@ def build_problem(
     )
 
 
-def _joined(scene: Scene, others: tuple[Moving, ...], document: YamlDocument) -> Scene:
-    """The obstacles, then the bodies of other arms."""
+def joined(
+    scene: Scene, more: Sequence[Obstacle], document: YamlDocument, at: str = "others"
+) -> Scene:
+    """The obstacles, then more, such as the bodies of other arms and robots.
+
+    Raises:
+        InvalidFile: If two have the same name, or one is too far away.
+    """
     try:
-        return Scene((*scene.obstacles, *others)) if others else scene
+        return Scene((*scene.obstacles, *more)) if more else scene
     except InvalidInput as error:
-        raise document.invalid(("others",), str(error)) from None
+        raise document.invalid((at,), str(error)) from None
 
 
 def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:

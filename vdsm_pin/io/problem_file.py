@@ -1,16 +1,17 @@
 """Problem files by path or built-in name: the only reader of the YAML contract."""
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from pydantic import ValidationError
 
 from vdsm_pin.errors import InvalidFile, UnknownName
-from vdsm_pin.io.arm_schema import ManipulatorModel, UrdfManipulatorModel
+from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_schema import FromFileModel
+from vdsm_pin.io.others import OtherReader, Others, ReadRobot, files_of_arm
 from vdsm_pin.io.path_schema import FilePart
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import first_error
@@ -31,11 +32,14 @@ class ProblemOfRobot(InvalidFile):
     """The problem is about a robot of a URDF, which `robots.cell` reads."""
 
 
-def read_problem(name_or_path: str | Path) -> PlanningProblem:
+def read_problem(
+    name_or_path: str | Path, read_robot: ReadRobot | None = None
+) -> PlanningProblem:
     """The problem of a built-in name or a file.
 
     Args:
         name_or_path: Such as `paper/obs1` or `problems/mine.yaml`.
+        read_robot: Reads robots of a URDF among its `others`; None where nobody does.
 
     Returns:
         The problem in metres, radians and the base frame (x along the rail).
@@ -44,9 +48,6 @@ def read_problem(name_or_path: str | Path) -> PlanningProblem:
         InvalidFile: If the file or its content breaks the contract of docs/files.md.
         ProblemOfRobot: If it has `robot` in place of `manipulator`.
 
-    Example:
-        >>> read_problem("paper/obs1").manipulator.n_links
-        8
     """
     path = find_problem(name_or_path)
     content = read_bytes(path, limit=MAX_PROBLEM_BYTES)
@@ -64,35 +65,36 @@ def read_problem(name_or_path: str | Path) -> PlanningProblem:
     except ValidationError as error:
         raise first_error(error, document, ProblemModel) from None
     stem = "".join(c if c.isalnum() else "_" for c in path.stem[:100])
-    digest = hashlib.sha256(content)
+    digest, folder, of_others = hashlib.sha256(content), path.parent, list[Path]()
+
+    def read_others(frame: Frame) -> Others:
+        found = OtherReader(document, frame, folder, read_robot).read(model.others)
+        of_others.extend(found.files)
+        return found
+
     problem = build_problem(
-        model, document, name=stem, folder=path.parent, digest=digest
+        *(model, document),
+        name=stem,
+        folder=folder,
+        digest=digest,
+        read_others=read_others,
     )
-    named = tuple(path.parent / name for name in _files_named(model))
+    named = tuple(_files_named(model, folder, of_others))
     of_obstacles = files_of_obstacles(model.obstacles, path.parent)
     source = ProblemSource(path, digest.hexdigest(), named, of_obstacles)
     return problem.read_from(source)
 
 
-def _files_named(model: ProblemModel) -> list[str]:
+def _files_named(
+    model: ProblemModel, folder: Path, of_others: Sequence[Path]
+) -> Iterator[Path]:
     """All files that a problem names, in the order in which the hash takes them."""
-    path = model.tip_path
-    files = [one.file for one in model.obstacles if isinstance(one, FromFileModel)]
-    found = [*_files_of_arm(model.manipulator), *files]
-    for other in model.others:
-        found += [*_files_of_arm(other.manipulator), other.trajectory]
+    obstacles, path = model.obstacles, model.tip_path
+    files = [one.file for one in obstacles if isinstance(one, FromFileModel)]
+    yield from (folder / name for name in (*files_of_arm(model.manipulator), *files))
+    yield from of_others
     parts = path.points if path else []
-    return [*found, *(p.file for p in parts if isinstance(p, FilePart))]
-
-
-def _files_of_arm(
-    model: str | ManipulatorModel | UrdfManipulatorModel,
-) -> list[str]:
-    """The URDF of an arm, or the meshes that its links carry."""
-    if isinstance(model, UrdfManipulatorModel):
-        return [model.urdf]
-    bodies = [] if isinstance(model, str) else model.bodies
-    return [one.file for one in bodies if isinstance(one, FromFileModel)]
+    yield from (folder / part.file for part in parts if isinstance(part, FilePart))
 
 
 def files_of_obstacles(

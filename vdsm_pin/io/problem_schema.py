@@ -14,6 +14,7 @@ from vdsm_pin.io.errors_schema import ErrorsModel
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.path_schema import TipPathModel
 from vdsm_pin.io.posture_schema import GoalModel, Start
+from vdsm_pin.io.robot_schema import RobotModel
 from vdsm_pin.io.schema_types import (
     FileModel,
     FileName,
@@ -44,21 +45,29 @@ class BasePoseModel(FileModel):
 
 
 class OtherModel(FileModel):
-    """Another arm, which moves as its own trajectory says."""
+    """Another snake arm or robot, which moves as its own trajectory says."""
 
     name: Name = Field(
-        description="Its bodies are `NAME: link 1` and so on, in results and errors."
+        description="Its bodies are `NAME: link 1` and so on, or `NAME: LINK`, in "
+        "results and errors."
     )
-    manipulator: ManipulatorField = Field(
-        description="Name of a built-in arm, or an arm of its own."
+    manipulator: ManipulatorField | None = Field(
+        default=None,
+        description="Of a snake arm: the name of a built-in one, or one of its own.",
+    )
+    robot: RobotModel | None = Field(
+        default=None, description="Of any other robot, in place of manipulator."
     )
     base: BasePoseModel = Field(
         default=BasePoseModel(),
-        description="Where its rail is, in the frame of this file. Default: at the "
-        "origin.",
+        description="Where its rail or root link is, in the frame of this file. "
+        "Default: at the origin.",
     )
     trajectory: FileName = Field(
-        description="Its trajectory, a CSV with a column time_s, relative to this file."
+        description="Its trajectory, with times, relative to this file."
+    )
+    topic: str | None = Field(
+        default=None, description="Of a bag, where it has several: NAME or NAME#K."
     )
 
 
@@ -108,8 +117,8 @@ class ProblemModel(FileModel):
     obstacles: list[MovableModel] = Field(default=[], description="Solids to avoid.")
     others: list[OtherModel] = Field(
         default=[],
-        description="Other arms: each link is an obstacle that moves. Trajectories "
-        "then need a column time_s.",
+        description="Other snake arms and robots: each link is an obstacle that "
+        "moves. Trajectories then need times.",
     )
     tip_path: TipPathModel | None = Field(
         default=None,

@@ -1,9 +1,9 @@
 """Obstacles, at rest and moving, in the base frame."""
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
@@ -20,6 +20,22 @@ if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
 
 
 @dataclass(frozen=True, eq=False)
+class ByItself:
+    """What is known of another arm or robot, beside where its bodies are.
+
+    Args:
+        notes: What a reader should know, a sentence each.
+        covers: By link, of each of its meshes the triangles under each hull, or the
+            primitive around it, where that is not one hull each.
+        checks: Rows of evidence about it alone, such as its limits.
+    """
+
+    notes: tuple[str, ...] = ()
+    covers: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    checks: Callable[[], Sequence[Any]] = tuple
+
+
+@dataclass(frozen=True, eq=False)
 class Carrier:
     """Joints that carry obstacles about as time goes by.
 
@@ -27,11 +43,13 @@ class Carrier:
         tree: The joints, hung on the base's frame.
         path: How they move, with times; at rest before and after.
         robot: Name of the other robot that it is; empty for what only moves.
+        itself: What is known of that.
     """
 
     tree: Tree
     path: "Path"
     robot: str = ""
+    itself: ByItself = ByItself()
 
     def poses(self, times: FloatArray) -> FloatArray:
         """T_base_frame of all frames at some times (m,), (m, n_frames, 4, 4); [m]."""
@@ -171,6 +189,11 @@ class Scene:
     def carriers(self) -> tuple[Carrier, ...]:
         """The carriers of the obstacles that move, each once."""
         return tuple(dict.fromkeys(one.carrier for one in self.moving))
+
+    def checks_of_carriers(self) -> Iterator[Any]:
+        """Rows of evidence about other arms and robots by themselves."""
+        for one in self.carriers:
+            yield from one.itself.checks()
 
 
 def with_hulls(scene: Scene, names: Collection[str]) -> Scene:

@@ -52,7 +52,9 @@ def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, 
 
 
 def file_notes(problem: AnyProblem) -> Iterator[str]:
-    """What the readers of meshes and clouds have to say, a sentence each."""
+    """What the readers of other robots, meshes and clouds say, a sentence each."""
+    for carrier in problem.scene.carriers:
+        yield from carrier.itself.notes
     solids = map(solid_of, problem.scene.obstacles)
     for one in (solid for solid in solids if isinstance(solid, FromFile)):
         kind = "mesh" if isinstance(one, Mesh) else "cloud"

@@ -21,9 +21,8 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
     return {
         "notes": (
             *cell.robot.notes,
-            *(note for one in cell.others for note in one.notes),
-            *mesh_notes(cell),
             *file_notes(cell),
+            *mesh_notes(cell),
             *longer_motions(cell, path.times),
             *(f"trajectory: {note}" for note in _said(verification)),
         ),

@@ -9,10 +9,9 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.geometry.solids import ConvexCover, Solid
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.question import Question
@@ -21,12 +20,12 @@ from vdsm_pin.robots.contacts import Placed
 from vdsm_pin.robots.errors import check_errors, proof_box
 from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.other_robots import OtherRobot, read_other
+from vdsm_pin.robots.other_robots import read_other
 from vdsm_pin.robots.scene_files import read_scene_with_files
-from vdsm_pin.robots.second_opinion import coal_parts, link_shapes
+from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.urdf import robot_of
 from vdsm_pin.units import in_mm
-from vdsm_pin.verification.coal_bodies import CoalObstacle, coal_bodies
+from vdsm_pin.verification.coal_hulls import coal_obstacle
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.moving import joined_tree, obstacle_frames
 from vdsm_pin.verification.records import Pair as NamedPair
@@ -47,7 +46,6 @@ class Cell(AnyProblem):
         name: Of the problem; empty for the robot's.
         T_world_base: The robot's root link in the frame of the files, (4, 4); [m].
         errors: What every clearance is asked for under.
-        others: Robots whose links are the last obstacles.
         source: The files it was read from; None where it was changed since by more than
             its errors.
 
@@ -63,7 +61,6 @@ class Cell(AnyProblem):
     name: str = ""
     T_world_base: FloatArray = field(default_factory=lambda: np.eye(4))
     errors: ErrorBox = field(default_factory=ErrorBox)
-    others: tuple[OtherRobot, ...] = ()
     source: ProblemSource | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
@@ -133,7 +130,7 @@ class Cell(AnyProblem):
     @cached_property
     def coal(self) -> CoalShapes:
         """The bodies as Coal has them."""
-        things = map(_coal, self.scene.obstacles)
+        things = map(coal_obstacle, self.scene.obstacles)
         frames = [body.frame for body in self.bodies]
         return CoalShapes(frames, [*link_shapes(self.robot), *things])
 
@@ -230,25 +227,17 @@ def read_cell(path: str | Path) -> Cell:
     pose = np.eye(4)
     pose[:3, :3] = file.frame.rotation
     pose[:3, 3] = file.frame.metres(file.model.base.position)
-    scene, of_obstacles = file.scene(_size(robot), _others(robot))
-    others = tuple(read_other(file, k) for k in range(len(file.others)))
-    links = (link for one in others for link in one.links)
-    try:
-        scene = Scene((*scene.obstacles, *links))
-    except InvalidInput as error:
-        raise file.document.invalid(("others",), str(error)) from None
-    more = (path for one in others for path in one.robot.more_files)
+    found = file.scene(_size(robot), _others(robot), read_other)
     cell = Cell(
         robot=robot,
-        scene=scene,
+        scene=found.scene,
         required_clearance=required,
         required_self_clearance=required_self,
         name=file.model.name or "",
         T_world_base=frozen(pose),
-        others=others,
-    ).read_from(file.source((*robot.more_files, *more), of_obstacles))
+    ).read_from(file.source(robot.more_files, found))
     try:
-        return cell.under(file.errors(scene))
+        return cell.under(file.errors(found.scene))
     except InvalidFile:
         raise
     except InvalidInput as error:
@@ -277,14 +266,6 @@ def locks(words: tuple[str, ...]) -> dict[str, float]:
 def _others(robot: Robot) -> list[str]:
     """Names of the links besides those that stand as the root link does."""
     return [name for name, frame in robot.frames.items() if frame != ROOT_FRAME]
-
-
-def _coal(obstacle: Obstacle) -> CoalObstacle | None:
-    """An obstacle as Coal has it; None where Coal cannot take a piece of it."""
-    solid: Solid | ConvexCover = solid_of(obstacle)
-    if isinstance(solid, ConvexCover):
-        return coal_parts(solid.pieces)
-    return coal_bodies(solid)
 
 
 def _size(robot: Robot) -> float:

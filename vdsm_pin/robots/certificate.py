@@ -1,15 +1,11 @@
 """The certificate of a robot's motion: what stands above the lines of its proof."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import IntArray
-from vdsm_pin.geometry.convex import Hull
-from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.bodies import Body, PairTable
@@ -21,9 +17,7 @@ from vdsm_pin.robots.inside import at_start, question_of_hulls, unlocated_pairs
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.certificate_file import (
-    LinkPieces,
     Pair,
-    Primitive,
     RobotErrors,
     RobotHeaderLine,
 )
@@ -33,15 +27,17 @@ from vdsm_pin.verification.certificate_lines import (
     check_certified,
     write_lines,
 )
+from vdsm_pin.verification.certificate_links import (
+    Covers,
+    link_pieces,
+    links_of_others,
+)
 from vdsm_pin.verification.certificate_writer import (
     errors_beside,
     joined_corners,
     pieces_of_obstacles,
 )
 from vdsm_pin.verification.moving import joined_path
-
-EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
-"""By the number of a primitive's corners those at the ends of the first one's edges."""
 
 
 def write_robot_certificate(
@@ -79,10 +75,8 @@ def write_robot_certificate(
     n_bodies = len(bodies) + len(meshes)
     # Where each body as it was given stands among those that were packed.
     places = np.argsort(plan.number[:n_bodies], kind="stable").tolist()
-    of_obstacles, rest = places[n_links : len(bodies)], cell.scene.obstacles
-    first = len(rest) - sum(len(one.links) for one in cell.others)
-    obstacles = zip(of_obstacles[:first], rest[:first], strict=True)
-    links = places[:n_links] + of_obstacles[first:]
+    of_obstacles = places[n_links : len(bodies)]
+    obstacles = [*zip(of_obstacles, cell.scene.obstacles, strict=True)]
     header = RobotHeaderLine(
         **hashes.as_json(),
         interpolation=JOINED[motion.degree],
@@ -90,7 +84,10 @@ def write_robot_certificate(
         pieces=pieces_of_obstacles(obstacles, pieces),
         joined=joined_corners(cell.scene),
         errors=_errors(cell, errors),
-        links=_links(cell, links, pieces),
+        links={
+            **dict(link_pieces(_covered(cell), places[:n_links], pieces)),
+            **links_of_others(obstacles, pieces),
+        },
         topic=topic,
     )
     one_plane = np.zeros(len(pieces.root), np.int64)
@@ -98,6 +95,14 @@ def write_robot_certificate(
         one_plane[place] = len(bodies[number].pieces)
     proof = Recorded(proving.task, proving.motion, one_plane)
     write_lines(path, header, proof, deadline)
+
+
+def _covered(cell: Cell) -> Iterator[tuple[str, Covers]]:
+    """Each link with what covers its meshes; nothing where each is one hull."""
+    robot = cell.robot
+    for body in robot.bodies:
+        covers = () if robot.solids == HULLS else robot.covers.get(body.name, ())
+        yield body.name, covers
 
 
 def _errors(cell: Cell, errors: ErrorBox) -> RobotErrors:
@@ -124,38 +129,3 @@ def _pairs(parts: list[Body], bodies: list[Body], pairs: PairTable) -> list[Pair
             names[k] = f"{part.name} part {seen[part.name]}"
     both = zip(pairs.one.tolist(), pairs.other.tolist(), strict=True)
     return [(names[one], names[other]) for one, other in both]
-
-
-def _links(
-    cell: Cell, places: Sequence[int], pieces: PackedPieces
-) -> dict[str, LinkPieces]:
-    """Of each link that is not as its URDF says what it is made of."""
-    found = {}
-    robots = [("", cell.robot), *((f"{x.name}: ", x.robot) for x in cell.others)]
-    bodies = [(*one, body) for one in robots for body in one[1].bodies]
-    for k, (whose, robot, body) in zip(places, bodies, strict=True):
-        order = pieces.order[pieces.first_piece[k] : pieces.first_piece[k + 1]]
-        sorted_ = bool((np.diff(order) != 1).any())
-        covers = () if robot.solids == HULLS else robot.covers.get(body.name)
-        if sorted_ or covers:
-            found[whose + body.name] = LinkPieces(
-                order=order.tolist() if sorted_ else [],
-                meshes=[_cover(cover) for cover in covers or ()],
-            )
-    return found
-
-
-def _cover(cover: tuple[IntArray, ...] | Hull) -> list[int] | Primitive:
-    """What holds a mesh: the hull over each of its triangles, or a primitive."""
-    if not isinstance(cover, Hull):
-        hulls = np.zeros(sum(map(len, cover)), np.int64)
-        for k, group in enumerate(cover):
-            hulls[group] = k
-        return [int(k) for k in hulls]
-    origin = cover.points[0]
-    edges = [cover.points[k] - origin for k in EDGES[len(cover.points)]]
-    return Primitive(
-        origin_m=origin.tolist(),
-        edges_m=[edge.tolist() for edge in edges],
-        radius_m=cover.radius,
-    )

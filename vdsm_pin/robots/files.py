@@ -3,30 +3,32 @@
 Nothing of geometry is worked out here; whoever reads a robot by itself begins here.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
-from itertools import chain
 from pathlib import Path
-from typing import Annotated, Final, Literal, TypeAlias, get_args
+from typing import Annotated, Final, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen, rotation_from_rpy
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.body_schema import MAX_PARTS
 from vdsm_pin.io.errors_builder import build_errors
 from vdsm_pin.io.errors_schema import ErrorsModel
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
+from vdsm_pin.io.others import OtherReader, ReadRobot
+from vdsm_pin.io.problem_builder import joined
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_file import files_of_obstacles
-from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
-from vdsm_pin.io.schema_types import FileModel, FileName, Name, NotNegative, Number
-from vdsm_pin.io.source import check_is_file_or_bag, files_in, read_text
+from vdsm_pin.io.problem_schema import BasePoseModel, OtherModel, not_bool
+from vdsm_pin.io.robot_schema import CoverKind, RobotModel
+from vdsm_pin.io.schema_types import Name, NotNegative
+from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -35,8 +37,6 @@ from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, read_scene_with_f
 
 Named: TypeAlias = tuple[tuple[str, Path], ...]
 """Names of obstacles that have a file of their own, with it."""
-
-CoverKind: TypeAlias = Literal["hull", "parts", "primitives"]
 
 PARTS: Final = 8
 """Hulls that a mesh is covered by, where `parts` is asked for without a number."""
@@ -144,6 +144,21 @@ class RobotFiles:
         return (self.urdf, *filter(None, (self.srdf, self.joint_limits)))
 
 
+def files_of_robot(model: RobotModel, folder: Path) -> RobotFiles:
+    """The files that a robot of a problem names in its folder."""
+    optional = (model.srdf, model.joint_limits)
+    srdf, limits = (None if name is None else folder / name for name in optional)
+    return RobotFiles(
+        folder / model.urdf,
+        srdf,
+        tuple(folder / name for name in model.package_dirs),
+        model.lock,
+        model.group,
+        solids_of(model.bodies, model.parts),
+        limits,
+    )
+
+
 def solids_of(bodies: CoverKind | None, parts: int | None) -> MeshCover:
     """What stands for meshes; a number of parts alone asks for parts.
 
@@ -155,71 +170,6 @@ def solids_of(bodies: CoverKind | None, parts: int | None) -> MeshCover:
         message = f"parts is {parts} beside bodies {cover!r}, expected bodies 'parts'"
         raise InvalidInput(message)
     return MeshCover(cover, parts or PARTS)
-
-
-class RobotModel(FileModel):
-    """A robot by its URDF."""
-
-    urdf: str = Field(description="File, relative to this one.")
-    srdf: str | None = Field(
-        default=None,
-        description="File with the pairs of links that are not held apart. Default: "
-        "links joined by one joint are not.",
-    )
-    package_dirs: list[str] = Field(
-        default=[], description="Folders where package:// is looked for."
-    )
-    lock: dict[str, Number] = Field(
-        default={}, description="Joints that stand still, in the URDF's units [rad, m]."
-    )
-    group: str | None = Field(
-        default=None,
-        description="Group of the SRDF whose joints a trajectory moves; the others "
-        "stand where lock says, or at 0. Default: all move that are not locked.",
-    )
-    bodies: CoverKind | None = Field(
-        default=None,
-        description="What stands for the mesh of a link: its hull, hulls of parts of "
-        "it, or a ball, capsule or box around it (primitives). Default: hull.",
-    )
-    parts: int | None = Field(
-        default=None, ge=1, le=MAX_PARTS, description="Hulls of one mesh, with parts."
-    )
-    joint_limits: str | None = Field(
-        default=None, description="A joint_limits.yaml of MoveIt; the stricter counts."
-    )
-
-    def files(self, folder: Path) -> RobotFiles:
-        """The files that it names in a folder."""
-        optional = (self.srdf, self.joint_limits)
-        srdf, limits = (None if name is None else folder / name for name in optional)
-        return RobotFiles(
-            folder / self.urdf,
-            srdf,
-            tuple(folder / name for name in self.package_dirs),
-            self.lock,
-            self.group,
-            solids_of(self.bodies, self.parts),
-            limits,
-        )
-
-
-class OtherRobotModel(FileModel):
-    """Another robot, which moves as its own trajectory says."""
-
-    name: Name = Field(description="Its links are `NAME: LINK`, in results and errors.")
-    robot: RobotModel = Field(description="As the one that is judged.")
-    base: BasePoseModel = Field(
-        default=BasePoseModel(),
-        description="Where its root link is, in the frame of this file. Default: at "
-        "the origin.",
-    )
-    trajectory: FileName = Field(
-        description="Its trajectory, with times, relative to this file."
-    )
-    topic: str | None = Field(
-        default=None, description="Of a bag, where it has several: NAME or NAME#K."
-    )
 
 
 class CellModel(SceneModel):
@@ -240,10 +190,10 @@ class CellModel(SceneModel):
         description="File of more obstacles, in the frame of the root link: YAML with "
         "obstacles, a PlanningScene of MoveIt, or a world in MJCF.",
     )
-    others: list[OtherRobotModel] = Field(
+    others: list[OtherModel] = Field(
         default=[],
-        description="Other robots: each link is an obstacle that moves. Trajectories "
-        "then need times.",
+        description="Other robots and snake arms: each link is an obstacle that moves. "
+        "Trajectories then need times.",
     )
     required_clearance: NotNegative = Field(
         description="Between the surfaces of links and obstacles [length_unit]."
@@ -256,25 +206,6 @@ class CellModel(SceneModel):
         description="How far joints, base and obstacles may be off. Default: not at "
         "all.",
     )
-
-
-@dataclass(frozen=True)
-class OtherFile:
-    """Another robot of a problem, by files.
-
-    Args:
-        name: Of the robot here.
-        robot: Its files.
-        trajectory: Its motion.
-        topic: Of a bag.
-        pose: T_base_root: its root link as seen from that of the robot, (4, 4); [m].
-    """
-
-    name: str
-    robot: RobotFiles
-    trajectory: Path
-    topic: str | None
-    pose: FloatArray
 
 
 @dataclass(frozen=True)
@@ -294,7 +225,7 @@ class CellFile:
     @cached_property
     def robot(self) -> RobotFiles:
         """The robot, by files."""
-        return self.model.robot.files(self.path.parent)
+        return files_of_robot(self.model.robot, self.path.parent)
 
     @cached_property
     def frame(self) -> Frame:
@@ -303,78 +234,65 @@ class CellFile:
         rotation = rotation_from_rpy(radians(base.rpy_deg))
         return Frame(self.model.length_unit, rotation, np.array(base.position))
 
-    @cached_property
-    def others(self) -> tuple[OtherFile, ...]:
-        """The other robots, by files.
-
-        Raises:
-            InvalidFile: If there is no such trajectory.
-        """
-        folder, found = self.path.parent, []
-        for i, model in enumerate(self.model.others):
-            try:
-                check_is_file_or_bag(folder / model.trajectory)
-            except InvalidFile as error:
-                at, name = ("others", i, "trajectory"), model.trajectory
-                raise self.document.invalid_file(at, name, error) from None
-            pose = np.eye(4)
-            pose[:3, :3] = self.frame.orientation(model.base.rpy_deg)
-            pose[:3, 3] = self.frame.point(model.base.position)
-            robot, motion = model.robot.files(folder), folder / model.trajectory
-            found.append(
-                OtherFile(model.name, robot, motion, model.topic, frozen(pose))
-            )
-        return tuple(found)
-
     @property
     def required(self) -> tuple[float, float]:
         """Least clearance from obstacles, and between links; [m]."""
         asked = self.model.required_clearance, self.model.required_self_clearance
         return float(self.frame.metres(asked[0])), float(self.frame.metres(asked[1]))
 
-    def scene(self, robot_size: float, links: Collection[str]) -> tuple[Scene, Named]:
-        """The obstacles in the robot's base frame, and those with files of their own.
+    def scene(
+        self, robot_size: float, links: Collection[str], read_robot: ReadRobot
+    ) -> "CellScene":
+        """The obstacles in the robot's base frame, bodies of other robots the last.
 
         Args:
             robot_size: For judging the size of a mesh; [m].
             links: Of the robot, besides the root link.
+            read_robot: Reads the other robots.
 
         Raises:
             InvalidFile: If one breaks its contract, or is of a kind that is not judged.
         """
-        folder, frame = self.path.parent, self.frame
+        folder, frame, files = self.path.parent, self.frame, list[Path]()
         builder = ObstacleBuilder(self.document, folder, frame, robot_size, sha256())
-        own = builder.build_all(self.model.obstacles, ("obstacles",))
+        scene = Scene(builder.build_all(self.model.obstacles, ("obstacles",)))
         named = files_of_obstacles(self.model.obstacles, folder)
-        if self.model.scene is None:
-            return Scene(own), named
-        file = folder / self.model.scene
-        more, files = read_scene_with_files(file, robot_size, links)
-        try:
-            return Scene((*own, *more.obstacles)), (*named, *files)
-        except InvalidInput as error:
-            raise self.document.invalid(("scene",), str(error)) from None
+        if self.model.scene is not None:
+            files.append(folder / self.model.scene)
+            more, included = read_scene_with_files(files[0], robot_size, links)
+            scene = joined(scene, more.obstacles, self.document, "scene")
+            named = (*named, *included)
+        others = OtherReader(self.document, frame, folder, read_robot)
+        found = others.read(self.model.others)
+        scene = joined(scene, found.bodies, self.document)
+        return CellScene(scene, (*files, *found.files), named)
 
-    def errors(self, scene: Scene, links: Collection[str] = ()) -> ErrorBox:
+    def errors(self, scene: Scene) -> ErrorBox:
         """The errors under which every clearance is asked for.
-
-        Args:
-            scene: The obstacles.
-            links: Names of more: links of other robots, where the scene lacks them.
 
         Raises:
             InvalidFile: If they name an obstacle that there is not.
         """
-        model, frame = self.model.errors, self.frame
-        return build_errors(model, frame, scene, self.document, links)
+        return build_errors(self.model.errors, self.frame, scene, self.document)
 
-    def source(self, more: tuple[Path, ...], of_obstacles: Named) -> ProblemSource:
+    def source(self, of_links: Iterable[Path], scene: "CellScene") -> ProblemSource:
         """All files that it is read from, those of links and obstacles too."""
-        names = filter(None, [self.model.scene])
-        scene = (self.path.parent / name for name in names)
-        others = ((*x.robot.files, *files_in(x.trajectory)) for x in self.others)
-        named = (*more, *scene, *chain.from_iterable(others))
-        return source_of((self.path, *self.robot.files, *named), of_obstacles)
+        files = (self.path, *self.robot.files, *of_links, *scene.files)
+        return source_of(files, scene.of_obstacles)
+
+
+class CellScene(NamedTuple):
+    """What stands and moves around a robot, and the files that it is read from.
+
+    Args:
+        scene: The obstacles.
+        files: The scene file, and those of other arms and robots.
+        of_obstacles: Names of obstacles that have a file of their own, with it.
+    """
+
+    scene: Scene
+    files: tuple[Path, ...]
+    of_obstacles: Named
 
 
 def read_cell_file(path: Path) -> CellFile:

@@ -1,6 +1,6 @@
 """Convex covers of points: hulls by Coal (Qhull), and the simplest solids."""
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -11,9 +11,7 @@ from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.tolerances import TOLERANCES
-
-FLAT: Final = 1e-6
-"""Coal's hull of points flatter than this part of their size ends the process; [-]."""
+from vdsm_pin.verification.coal_hulls import coal_hull
 
 UNIT_BOX: Final = (BOX_CORNERS + 1.0) / 2.0
 
@@ -126,32 +124,6 @@ def covering_primitive(points: FloatArray) -> Hull:
         np.pi * girth**2 * (length + 4.0 / 3.0 * girth),
     ]
     return (box, ball, capsule)[int(np.argmin(volumes))]
-
-
-def is_solid(points: FloatArray) -> bool:
-    """Whether points are far enough from one plane for Coal's hull."""
-    if len(points) < 4:
-        return False
-    _, sizes, _ = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    return bool(sizes[-1] > FLAT * sizes[0])
-
-
-def coal_hull(points: FloatArray) -> Any | None:
-    """The hull as a coal.Convex; None where the points are flat or Qhull gives up."""
-    import coal
-
-    if not is_solid(points):
-        return None
-    vertices = coal.StdVec_Vec3s()
-    vertices.extend([np.array(point) for point in points])
-    # A face of hundreds of corners, cut into a fan, has more neighbours at its tip than
-    # Coal can count; of joggled points it is cut otherwise.
-    for how in ("Qt", "QJ"):
-        try:
-            return coal.Convex.convexHull(vertices, True, how)
-        except RuntimeError:
-            continue
-    return None
 
 
 def hull_planes(points: FloatArray) -> tuple[FloatArray, FloatArray] | None:

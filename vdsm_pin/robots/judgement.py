@@ -1,13 +1,11 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import VdsmError
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Side
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
@@ -15,6 +13,7 @@ from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, answer, prove
 from vdsm_pin.proof.terms import REFUTED
+from vdsm_pin.robots.by_itself import limit_checks, pose_check
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.clearances import (
     MEETING,
@@ -31,11 +30,7 @@ from vdsm_pin.robots.inside import (
     locate_links,
     pairs_inside,
 )
-from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.rates import rate_checks
-from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.clearance import profile_of
@@ -43,22 +38,13 @@ from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_che
 from vdsm_pin.verification.coal_check import Evidence as CoalEvidence
 from vdsm_pin.verification.coal_shapes import disagreement
 from vdsm_pin.verification.enclosed import enclosed_least
-from vdsm_pin.verification.extremes import range_check
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.moving import Knots, in_short_parts, joined_path
 from vdsm_pin.verification.records import Check, Verdict, Verification
 
-POSES: Final = "link poses by Pinocchio against the tree's"
-LIMITS: Final = "joint {name!r} in its limits"
 NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
-POSE_ERROR: Final = 1e-9
-"""Where Pinocchio and the tree must agree; [m] or, of rotations, [-]."""
-
-COMPARED: Final = 1000
-"""Most waypoints at which poses are compared, spread evenly."""
-
 WIDTH: Final = 0.1
 """How wide brackets may be but for the least one, as a part of the clearance; [-]."""
 
@@ -121,11 +107,9 @@ def verify_robot(
         ),
     )
     checks = [
-        _poses(robot, path),
-        *(_poses(one.robot, one.path, f"{one.name}: ") for one in cell.others),
-        *_limits(robot, path),
-        *rate_checks(robot.joints, path),
-        *_limits_of_others(cell),
+        pose_check(robot, path),
+        *limit_checks(robot, path),
+        *cell.scene.checks_of_carriers(),
         *check_inside(by_mesh(cell, located), INSIDE),
         *clearance_checks(cell, evidence, None if proof.in_time else deadline),
         *([coal] if cell.pairs else [_no_pair(cell)]),
@@ -166,45 +150,6 @@ def _is_clear(cell: Cell, path: Path, deadline: Deadline) -> bool:
     return prove(cell.tree, cell.bodies, path, cell.pairs, budget=budget).is_certified
 
 
-def _poses(robot: Robot, path: Path, whose: str = "") -> Check:
-    """Of another robot under its name, at moments of its own, which are not told."""
-    step = -(-len(path.knots) // COMPARED)
-    rows = np.arange(0, len(path.knots), step)
-    try:
-        off = pose_difference(robot, path.knots[rows])
-    except VdsmError as error:
-        where = f"not done: {error}"
-        return Check(whose + POSES, Verdict.UNDECIDED, 0, nan, POSE_ERROR, "-", where)
-    k = int(np.argmax(off))
-    good = bool((off <= POSE_ERROR).all())
-    verdict = Verdict.CERTIFIED if good else Verdict.REFUTED
-    where = f"{len(robot.frames)} links at {len(rows)} of {len(path.knots)} waypoints"
-    count = len(rows) * len(robot.frames)
-    found, moment = float(off[k]), nan if whose else float(rows[k])
-    name = whose + POSES
-    return Check(name, verdict, count, found, POSE_ERROR, "-", where, moment)
-
-
-def _limits(robot: Robot, path: Path) -> list[Check]:
-    """A row for each joint with limits; slack for the arithmetic of readers."""
-    rows = []
-    for k, joint in enumerate(robot.joints):
-        ends = joint.lower, joint.upper
-        if np.isfinite(ends).all():
-            name, n = LIMITS.format(name=joint.name), len(path.knots)
-            row = Check(name, Verdict.UNDECIDED, n, nan, nan, joint.unit, joint.whose)
-            rows.append(range_check(path, k, ends, TOLERANCES.arithmetic, row))
-    return rows
-
-
-def _limits_of_others(cell: Cell) -> Iterator[Check]:
-    """The same rows of other robots, whose moments are not those of the motion."""
-    for one in cell.others:
-        rates = rate_checks(one.robot.joints, one.path)
-        for check in (*_limits(one.robot, one.path), *rates):
-            yield replace(check, name=f"{one.name}: {check.name}", moment=nan)
-
-
 def _coal(
     cell: Cell, path: Path, proof: Proof, knots: Knots
 ) -> tuple[Check, FloatArray]:
@@ -231,7 +176,4 @@ def _coal(
         worst = measured[np.argmax(off[measured])]
         evidence.add(float(off[worst]), "", float(moments[worst]))
     where = f"{evidence.count} of {len(cell.pairs)} pairs measured"
-    check = evidence.check(f"{where}, each where it was found nearest")
-    if not evidence.count:
-        check = replace(check, verdict=Verdict.UNDECIDED, worst=nan)
-    return check, found
+    return evidence.check(f"{where}, each where it was found nearest"), found

@@ -1,18 +1,24 @@
 """Other robots of a problem: links that move by a trajectory of their own."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
+from math import nan
 from typing import Final, cast
 
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.solids import ConvexCover
-from vdsm_pin.problem.scene import Carrier, Moving
+from vdsm_pin.io.others import OtherFile, Others
+from vdsm_pin.io.source import files_in
+from vdsm_pin.problem.scene import ByItself, Carrier, Moving
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.files import CellFile
+from vdsm_pin.robots.by_itself import limit_checks, pose_check
+from vdsm_pin.robots.files import HULLS, files_of_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.trajectory_files import path_of, read_motion
 from vdsm_pin.robots.urdf import robot_of
+from vdsm_pin.verification.records import Check
 
 HELD: Final = (
     "is judged by its limits and its clearance from this robot alone: clearances "
@@ -20,53 +26,37 @@ HELD: Final = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class OtherRobot:
-    """Another robot, and how it moves.
-
-    Args:
-        name: Of the robot in its problem.
-        robot: On a base of its own.
-        path: Its motion, with times.
-        links: Its bodies as obstacles.
-        notes: What a reader should know, a sentence each.
-    """
-
-    name: str
-    robot: Robot
-    path: Path
-    links: tuple[Moving, ...]
-    notes: tuple[str, ...]
-
-
-def read_other(file: CellFile, number: int) -> OtherRobot:
+def read_other(one: OtherFile) -> Others:
     """One of the other robots of a problem file.
 
-    Args:
-        file: The problem.
-        number: Which one, from 0.
-
     Raises:
-        InvalidFile: If one of its files breaks its contract, or its trajectory has no
-            times.
+        InvalidFile: If one of its files breaks its contract.
     """
-    one = file.others[number]
-    robot = robot_of(one.robot)
+    files = files_of_robot(one.model, one.folder)
+    robot = robot_of(files)
     motion = read_motion(one.trajectory, robot.joints, one.topic, robot.values)
     path = path_of(one.trajectory, motion)
-    if path.times is None:
-        problem = f"{one.trajectory.name!r} has no times, which it needs"
-        raise file.document.invalid(("others", number, "trajectory"), problem)
     base, *joints = robot.tree.joints
     tree = Tree((replace(base, placement=one.pose), *joints))
-    links = tuple(_links(one.name, robot, Carrier(tree, path, one.name)))
     said = (HELD, *robot.notes, *(f"trajectory: {note}" for note in motion.notes))
-    notes = tuple(f"{one.name}: {note}" for note in said)
-    return OtherRobot(one.name, robot, path, links, notes)
+    itself = ByItself(
+        notes=tuple(f"{one.name}: {note}" for note in said),
+        covers={} if robot.solids == HULLS else robot.covers,
+        checks=partial(_checks, one.name, robot, path),
+    )
+    links = tuple(_links(robot, Carrier(tree, path, one.name, itself)))
+    named = (*files.files, *robot.more_files, *files_in(one.trajectory))
+    return Others(links, named, path.times is not None)
 
 
-def _links(name: str, robot: Robot, carrier: Carrier) -> Iterator[Moving]:
+def _links(robot: Robot, carrier: Carrier) -> Iterator[Moving]:
     for body in robot.bodies:
         pieces = cast("tuple[Hull | FlatCylinder, ...]", tuple(body.pieces))
-        cover = ConvexCover(f"{name}: {body.name}", pieces)
+        cover = ConvexCover(f"{carrier.robot}: {body.name}", pieces)
         yield Moving(cover, carrier, body.frame)
+
+
+def _checks(name: str, robot: Robot, path: Path) -> list[Check]:
+    """Its poses and limits; their moments are not those of the motion judged."""
+    checks = (pose_check(robot, path), *limit_checks(robot, path))
+    return [replace(one, name=f"{name}: {one.name}", moment=nan) for one in checks]

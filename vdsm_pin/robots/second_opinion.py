@@ -1,17 +1,15 @@
 """Pinocchio and Coal about a robot: poses from the same URDF, distances of pairs."""
 
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy, turn_z_to
-from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
-from vdsm_pin.robots.hulls import coal_hull
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.verification.coal_bodies import CoalBody
+from vdsm_pin.verification.coal_hulls import coal_parts
 from vdsm_pin.verification.pinocchio_frames import PinocchioFrames, read_model
 
 KEPT: Final = 8
@@ -124,31 +122,3 @@ def _bare(text: str) -> str:
 def link_shapes(robot: Robot) -> tuple[tuple[CoalBody, ...] | None, ...]:
     """Coal's shapes of each body of a robot, in its link's frame."""
     return tuple(coal_parts(body.pieces) for body in robot.bodies)
-
-
-def coal_parts(pieces: Sequence[Piece]) -> tuple[CoalBody, ...] | None:
-    """Convex pieces of a link as Coal's shapes; None where Coal cannot take one."""
-    import coal
-
-    found = []
-    for piece in pieces:
-        if isinstance(piece, FlatCylinder):
-            shape = coal.Cylinder(piece.radius, 2.0 * piece.half_length)
-            pose = coal.Transform3s(turn_z_to(piece.axis), np.array(piece.centre))
-        elif isinstance(piece, Hull) and len(piece.points) == 1:
-            shape = coal.Sphere(piece.radius)
-            pose = coal.Transform3s(np.eye(3), np.array(piece.points[0]))
-        elif isinstance(piece, Hull) and len(piece.points) == 2:
-            way = piece.points[1] - piece.points[0]
-            length = float(np.linalg.norm(way))
-            if not length > 0.0:
-                return None
-            shape = coal.Capsule(piece.radius, length)
-            middle = piece.points.mean(axis=0)
-            pose = coal.Transform3s(turn_z_to(way / length), middle)
-        elif isinstance(piece, Hull) and (shape := coal_hull(piece.points)):
-            pose = coal.Transform3s(np.eye(3), np.zeros(3))
-        else:
-            return None
-        found.append(CoalBody(shape, pose))
-    return tuple(found)

@@ -54,6 +54,27 @@ class RobotErrors(AnyErrors):
     joints_m: dict[str, Error] = Field(description="of each one that slides")
 
 
+class Primitive(LineModel):
+    """A ball, capsule or box that holds a mesh: no, one or three edges."""
+
+    origin_m: Point = Field(description="a corner, in the link's frame [m]")
+    edges_m: list[Point] = Field(description="from there [m]")
+    radius_m: Error = Field(description="by which that is grown [m]")
+
+
+class LinkPieces(LineModel):
+    """What a robot's link is made of, beyond what its URDF says."""
+
+    order: list[Number] = Field(
+        description="its pieces in the order in which planes count them; empty for "
+        "that of the file"
+    )
+    meshes: list[list[Number] | Primitive] = Field(
+        description="of each of its meshes the hull over each triangle, by numbers "
+        "from 0, or what holds it; empty where each is one hull"
+    )
+
+
 class AnyHeader(LineModel):
     """Line 1, of whatever moves."""
 
@@ -82,6 +103,10 @@ class AnyHeader(LineModel):
         "joined with], and seams, [three corners, where the edge beside them begins]; "
         "corner 3 k + i is corner i of triangle k, both from 0"
     )
+    links: dict[str, LinkPieces] = Field(
+        description="by name, of links that are not as their URDF says, those of other "
+        "robots too"
+    )
 
 
 class HeaderLine(AnyHeader):
@@ -90,32 +115,10 @@ class HeaderLine(AnyHeader):
     errors: ErrorLimits
 
 
-class Primitive(LineModel):
-    """A ball, capsule or box that holds a mesh: no, one or three edges."""
-
-    origin_m: Point = Field(description="a corner, in the link's frame [m]")
-    edges_m: list[Point] = Field(description="from there [m]")
-    radius_m: Error = Field(description="by which that is grown [m]")
-
-
-class LinkPieces(LineModel):
-    """What a robot's link is made of, beyond what its URDF says."""
-
-    order: list[Number] = Field(
-        description="its pieces in the order in which planes count them; empty for "
-        "that of the file"
-    )
-    meshes: list[list[Number] | Primitive] = Field(
-        description="of each of its meshes the hull over each triangle, by numbers "
-        "from 0, or what holds it; empty where each is one hull"
-    )
-
-
 class RobotHeaderLine(AnyHeader):
     """Line 1, of any robot."""
 
     errors: RobotErrors
-    links: dict[str, LinkPieces] = Field(description="by name, where there is any")
     topic: str | None = Field(description="of a bag, where the trajectory is one")
 
 

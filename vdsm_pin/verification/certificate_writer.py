@@ -15,7 +15,7 @@ import numpy as np
 from vdsm_pin.arm.bodies import triangle_groups
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.geometry.solids import Mesh, Prism
+from vdsm_pin.geometry.solids import ConvexCover, Mesh, Prism, Solid
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene, solid_of, with_hulls
@@ -29,6 +29,7 @@ from vdsm_pin.verification.certificate_lines import (
     check_certified,
     write_lines,
 )
+from vdsm_pin.verification.certificate_links import links_of_others
 from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.moving import whole_path
 from vdsm_pin.verification.records import ArmVerification
@@ -82,6 +83,7 @@ def _header(
         pairs=_pairs(problem),
         pieces=_pieces(problem, pieces),
         joined=joined_corners(problem.scene),
+        links=links_of_others([*enumerate(problem.scene.obstacles)], pieces),
     )
 
 
@@ -127,7 +129,9 @@ def pieces_of_obstacles(
     """
     result: dict[str, list[Any]] = {}
     for k, one in obstacles:
-        obstacle = solid_of(one)
+        obstacle: Solid | ConvexCover = solid_of(one)
+        if isinstance(obstacle, ConvexCover):
+            continue  # a link of another robot
         order = pieces.order[pieces.first_piece[k] : pieces.first_piece[k + 1]]
         if isinstance(obstacle, Prism) and len(order) > 1:
             triangles = _triangles(obstacle)

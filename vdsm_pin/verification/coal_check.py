@@ -50,13 +50,13 @@ class Evidence:
             self.worst, self.where, self.moment = excess, where, moment
 
     def check(self, note: str = "") -> Check:
-        """The row of evidence: undecided where the two disagree."""
-        agreed = self.worst <= TOLERANCES.coal_agreement
+        """The row of evidence: undecided where the two disagree, or none answers."""
+        agreed = self.count > 0 and self.worst <= TOLERANCES.coal_agreement
         return Check(
             name=COAL,
             verdict=Verdict.CERTIFIED if agreed else Verdict.UNDECIDED,
             count=self.count,
-            worst=self.worst,
+            worst=self.worst if self.count else float("nan"),
             limit=TOLERANCES.coal_agreement,
             unit="m",
             where=f"{self.where}{note}",
@@ -160,10 +160,11 @@ def check_coal(
         arm.spread(trajectory, deadline),
     )  # fmt: skip
     for found in chain(log.answers(arm, trajectory), _kept(rows, arm, proved, log)):
-        # Where there is no number the two do not agree.
-        excess = found.disagreement
+        # Of a link whose hull is flat Coal says nothing; elsewhere it has to agree.
+        silent, excess = np.isnan(found.distance), found.disagreement
         excess[np.isnan(excess)] = np.inf
-        evidence.count += excess.size
+        excess[silent] = -np.inf
+        evidence.count += int((~silent).sum())
         k = int(np.argmax(excess))
         evidence.add(float(excess[k]), _words(arm, found, k), float(found.moment[k]))
     total = arm.pairs.one.size * trajectory.n_samples

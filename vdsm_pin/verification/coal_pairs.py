@@ -3,11 +3,12 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.solids import Mesh, Solid
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Moving, solid_of
+from vdsm_pin.problem.scene import Moving, Obstacle
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.coal_bodies import CoalBody, CoalObstacle, coal_bodies
+from vdsm_pin.verification.coal_bodies import CoalBody, CoalObstacle
+from vdsm_pin.verification.coal_hulls import coal_obstacle
 from vdsm_pin.verification.coal_shapes import CoalShapes
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Pair
@@ -90,12 +91,12 @@ def arm_shapes(
     """
     import coal
 
-    def shape(solid: Solid) -> CoalObstacle:
+    def shape(solid: Obstacle) -> CoalObstacle | None:
         deadline.check()
-        return coal_bodies(solid)
+        return coal_obstacle(solid)
 
     n, carried = robot.manipulator.n_links, problem.manipulator.carried
-    shapes: list[CoalObstacle] = [
+    shapes: list[CoalObstacle | None] = [
         (CoalBody(rod, coal.Transform3s(local[:3, :3].copy(), local[:3, 3].copy())),)
         for rod, local in zip(robot.capsules, robot.T_link_capsule, strict=True)
     ]
@@ -107,5 +108,5 @@ def arm_shapes(
         frames.append(next_frame if moves else 0)
         next_frame += moves
     shapes += [shape(solid) for _, solid in carried]
-    shapes += [shape(solid_of(one)) for one in problem.scene.obstacles]
+    shapes += map(shape, problem.scene.obstacles)
     return CoalShapes(frames, shapes)

@@ -122,6 +122,7 @@ def verify(
         *guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline)),
         *judgement.planned(robot, centres),
         *check_limits(problem, trajectory),
+        *problem.scene.checks_of_carriers(),
         *tip.checks,
         *guarded(
             pointing.NAME,

@@ -1,0 +1,52 @@
+"""What is judged of a robot by itself: its poses by Pinocchio, its joint limits."""
+
+from math import nan
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import VdsmError
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.rates import rate_checks
+from vdsm_pin.robots.second_opinion import pose_difference
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.extremes import range_check
+from vdsm_pin.verification.records import Check, Verdict
+
+POSES: Final = "link poses by Pinocchio against the tree's"
+LIMITS: Final = "joint {name!r} in its limits"
+POSE_ERROR: Final = 1e-9
+"""Where Pinocchio and the tree must agree; [m] or, of rotations, [-]."""
+
+COMPARED: Final = 1000
+"""Most waypoints at which poses are compared, spread evenly."""
+
+
+def pose_check(robot: Robot, path: Path) -> Check:
+    """How far Pinocchio's poses of links are off the tree's."""
+    step = -(-len(path.knots) // COMPARED)
+    rows = np.arange(0, len(path.knots), step)
+    try:
+        off = pose_difference(robot, path.knots[rows])
+    except VdsmError as error:
+        where = f"not done: {error}"
+        return Check(POSES, Verdict.UNDECIDED, 0, nan, POSE_ERROR, "-", where)
+    k = int(np.argmax(off))
+    good = bool((off <= POSE_ERROR).all())
+    verdict = Verdict.CERTIFIED if good else Verdict.REFUTED
+    where = f"{len(robot.frames)} links at {len(rows)} of {len(path.knots)} waypoints"
+    count, told = len(rows) * len(robot.frames), (POSE_ERROR, "-", where)
+    return Check(POSES, verdict, count, float(off[k]), *told, float(rows[k]))
+
+
+def limit_checks(robot: Robot, path: Path) -> list[Check]:
+    """A row for each stated limit, of rates too; slack for the readers' arithmetic."""
+    rows = []
+    for k, joint in enumerate(robot.joints):
+        ends = joint.lower, joint.upper
+        if np.isfinite(ends).all():
+            name, n = LIMITS.format(name=joint.name), len(path.knots)
+            row = Check(name, Verdict.UNDECIDED, n, nan, nan, joint.unit, joint.whose)
+            rows.append(range_check(path, k, ends, TOLERANCES.arithmetic, row))
+    return [*rows, *rate_checks(robot.joints, path)]
