@@ -33,7 +33,7 @@ def joint(name: str, kind: str, axis: Any, parent: str, child: str, x: float) ->
     limit = SimpleNamespace(lower=-0.5, upper=0.5)
     return SimpleNamespace(
         name=name, type=kind, axis=np.array(axis, float), parent=parent, child=child,
-        origin=at(x), limit=limit,
+        origin=at(x), limit=limit, mimic=None,
     )  # fmt: skip
 
 

@@ -27,7 +27,6 @@ _NAMES: Final = {
 }
 
 
-_LENGTHS: Final = {"too_short": "least", "too_long": "most"}
 _WORDS: Final = {
     "float_type": "a number",
     "finite_number": "a finite number",
@@ -156,11 +155,16 @@ def _expected(details: ErrorDetails, at: Location) -> str:
     if kind == "string_pattern_mismatch":
         return _NAMES[context["pattern"]]
     if kind in ("too_short", "too_long"):
-        many = context["min_length" if kind == "too_short" else "max_length"]
-        return f"at {_LENGTHS[kind]} {many} {'entry' if many == 1 else 'entries'}"
+        least = kind == "too_short"
+        many = _entries(context["min_length" if least else "max_length"])
+        return f"at least {many}" if least else f"at most {many}"
     if kind in _WORDS:
         return _WORDS[kind].format_map(context)
     return details["msg"][:1].lower() + details["msg"][1:]
+
+
+def _entries(count: int) -> str:
+    return f"{count} entry" if count == 1 else f"{count} entries"
 
 
 def _shown(value: object) -> str:

@@ -244,9 +244,6 @@ class _Reader:
         if not (order < len(vertices)).all():
             problem = f"names vertex {order.max()} of {len(vertices)}"
             raise self._stream.invalid(problem)
-        if primitive.mode == _TRIANGLES and len(order) % 3:
-            problem = f"has triangles of {len(order)} corners, expected three each"
-            raise self._stream.invalid(problem)
         return Part(vertices, _triangles(order, primitive.mode))
 
     def _numbers(self, number: int, shape: str) -> FloatArray:
@@ -283,5 +280,5 @@ class _Reader:
 def _triangles(order: IntArray, mode: int) -> IntArray:
     """Vertex indices of triangles from a list, a strip or a fan."""
     if mode == _TRIANGLES:
-        return order.reshape(-1, 3)
+        return order[: len(order) // 3 * 3].reshape(-1, 3)
     return strip_triangles(order, fan=mode == _FAN)
