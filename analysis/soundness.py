@@ -298,31 +298,33 @@ def judge_tree(rng: np.random.Generator, motion: str, tally: Counter[str]) -> No
 
     A limit beyond the nearest that is known is missed, so it must not be certified.
     What is refuted must come as near as its witness says. A box is attacked from
-    corners.
+    corners. No limit is below 0, as in a problem: how deep bodies of several pieces
+    meet is not measured.
     """
     query = make_query(rng, TREES[motion], int(rng.integers(1, MOST_JOINTS + 1)))
     off = float(10.0 ** rng.uniform(-9.0, -3.0))
     args = query.tree, query.bodies, query.path
-    for required in (query.nearest + off, query.nearest - off):
-        missed = required > query.nearest
+    for limit in (query.nearest + off, query.nearest - off):
+        required = max(0.0, limit)
+        missing = required - query.nearest
         proof = prove(*args, [Pair(*rng.permutation(2).tolist(), required)])
         met = np.array([proof.share[0]])
         poses = query.tree.poses(tree_rows(query.path, met))
         nearest = clearances(query.tree, query.bodies, poses)[0]
         truth = Truth(
-            lost=np.array([missed and off > KNOWN]),
+            lost=np.array([missing > KNOWN]),
             kept=np.array([nearest >= required + KNOWN]),
-            far=np.array([missed and off >= FAR]),
+            far=np.array([missing >= FAR]),
         )
         _count(motion, np.array([query.shape]), truth, proof.verdict, tally)
-    box = random_box(rng, query.tree)
-    proof = prove(*args, [Pair(0, 1, query.nearest - 10.0 * off)], box)
+    box, required = random_box(rng, query.tree), max(0.0, query.nearest - 10.0 * off)
+    proof = prove(*args, [Pair(0, 1, required)], box)
     wrong = False
     for t in rng.uniform(size=ATTACKS if proof.is_certified else 0):
         row = tree_rows(query.path, np.array([t]))[0]
         poses = wrong_poses(query.tree, row, box, rng)[None]
         near = clearances(query.tree, query.bodies, poses)[0]
-        wrong |= bool(near < query.nearest - 10.0 * off - KNOWN)
+        wrong |= bool(near < required - KNOWN)
     truth = Truth(np.array([wrong]), np.array([False]), np.array([False]))
     _count(f"box_{motion}", np.array([query.shape]), truth, proof.verdict, tally)
     tally["certified boxes attacked"] += int(proof.is_certified)
