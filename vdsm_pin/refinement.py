@@ -80,7 +80,8 @@ class Refinement:
     Args:
         plan: The plan, its notes extended by the rounds.
         verification: Its verification: certified, or incomplete.
-        rounds: Every round; the last one has the same verdict.
+        rounds: Every round; the last one has the same verdict, of the scene at rest
+            where obstacles move.
     """
 
     plan: Plan

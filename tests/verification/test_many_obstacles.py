@@ -21,7 +21,7 @@ from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_arm, coal_check, robust
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import least_clearances, prove_clearance
+from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -134,7 +134,7 @@ def test_sinks_hear_of_near_obstacles_what_they_hear_of_all() -> None:
     assert (ours <= everything[0].upper[:, pairs] + 1e-9).all()
     assert (theirs <= near[0].upper + 1e-9).all()
     assert (near[0].verdict == everything[0].verdict[:, pairs])[both].all()
-    least = least_clearances(proof)
+    least = proof.least
     assert (least.lower <= all_lower.min(axis=0) + 1e-12).all()
     assert least.verdict.shape == (len(proof.pairs),)
 

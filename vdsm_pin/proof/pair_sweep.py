@@ -44,7 +44,7 @@ from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.plane_bounds import place_disc, place_own
 from vdsm_pin.proof.results import Results, note_upper
 from vdsm_pin.proof.row_places import seen
-from vdsm_pin.proof.search import Slicing, bound_between, new_witness, resolve
+from vdsm_pin.proof.search import Slicing, new_witness, place_pair, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
 from vdsm_pin.proof.swept_bodies import to_body
 from vdsm_pin.proof.terms import CERTIFIED, Mover, Task, finer, mover_of
@@ -190,7 +190,7 @@ def _subdivide(
     if dense.verdict.shape[0] > 0:
         m = stretch.offset + local
         row[START] = row[END] = time
-        bound_between(slicing, row)
+        place_pair(slicing, row)
         dense.lower[m, pair], dense.upper[m, pair] = lower, upper
         dense.time[m, pair], dense.verdict[m, pair] = time, verdict
         own, other, mover = (

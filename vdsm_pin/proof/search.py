@@ -106,14 +106,14 @@ def bound_between(slicing: Slicing, row: FloatArray) -> None:
         row: The slice.
     """
     apart()
-    _place(slicing, row)
+    place_pair(slicing, row)
     task, ends, space = slicing.task, slicing.ends, slicing.space
     slice_bound(task, ends, space, int(row[PAIR]), row[END] - row[START])
     row[KEY] = space.out[LOWER]
 
 
 @compiled
-def _place(slicing: Slicing, row: FloatArray) -> None:
+def place_pair(slicing: Slicing, row: FloatArray) -> None:
     """A pair's frames at the ends of a slice and how they move between."""
     task, motion, ends = slicing.task, slicing.motion, slicing.ends
     k, start, end = int(row[INTERVAL]), row[START], row[END]
@@ -144,7 +144,7 @@ def _bound_towards(
         Whether the bound is that of the pair itself.
     """
     apart()
-    _place(slicing, row)
+    place_pair(slicing, row)
     task, ends, space = slicing.task, slicing.ends, slicing.space
     pair, h = int(row[PAIR]), row[END] - row[START]
     version = finer(task.pairs, pair, pair)

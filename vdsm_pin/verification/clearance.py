@@ -7,6 +7,7 @@ clearance is subdivided further until its bracket is narrow.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
@@ -23,7 +24,6 @@ from vdsm_pin.proof.layouts import (
     LOW,
     OTHER,
     OWN,
-    SLICES,
     TALLY,
     TIME,
     UP,
@@ -65,7 +65,6 @@ class ClearanceProof:
         best: Least bounds of each pair, as `proof.layouts` lays them out,
             shape (n_pairs, BEST); [m].
         profile: Brackets along the motion.
-        slices: Slices tried beyond one per interval and pair.
         n_intervals: Of the motion.
         late: Whether the time was over before all was judged.
         sent: Intervals whose brackets the sinks received: all, if there was time.
@@ -75,10 +74,26 @@ class ClearanceProof:
     counts: IntArray
     best: FloatArray
     profile: ClearanceProfile
-    slices: int
     n_intervals: int
     late: bool
     sent: int
+
+    @cached_property
+    def least(self) -> LeastClearances:
+        """The least bounds of every pair, with their witnesses."""
+        best = self.best
+        own, other = best[:, OWN:OTHER], best[:, OTHER : OTHER + 3]
+        # In a pair of links the sweep moves the second one against the first.
+        swapped = np.array([not pair.obstacle for pair in self.pairs], bool)[:, None]
+        return LeastClearances(
+            interval=frozen(best[:, AT_UPPER], np.int64),
+            share=frozen(best[:, TIME]),
+            lower=frozen(best[:, LOW]),
+            upper=frozen(best[:, UP]),
+            verdict=verdicts_of(self.counts),
+            link_point=frozen(np.where(swapped, other, own)),
+            other_point=frozen(np.where(swapped, own, other)),
+        )
 
 
 def _chunk(
@@ -189,7 +204,6 @@ def prove_clearance(
         counts=frozen(results.counts, np.int64),
         best=frozen(proof.best),
         profile=profile_of(results.profile, results.stride, proof.knots, n_links),
-        slices=int(results.tally[SLICES]),
         n_intervals=len(proof.knots.first) - 1,
         late=late,
         sent=sent,
@@ -259,20 +273,3 @@ def _steps(first: IntArray, length: int) -> list[int]:
         reach = int(np.searchsorted(first, first[steps[-1]] + length, side="right"))
         steps.append(min(last, max(reach - 1, steps[-1] + 1)))
     return steps
-
-
-def least_clearances(proof: ClearanceProof) -> LeastClearances:
-    """The least bounds of every pair, with their witnesses."""
-    best = proof.best
-    own, other = best[:, OWN:OTHER], best[:, OTHER : OTHER + 3]
-    # In a pair of links the sweep moves the second one against the first.
-    swapped = np.array([not pair.obstacle for pair in proof.pairs], bool)[:, None]
-    return LeastClearances(
-        interval=frozen(best[:, AT_UPPER], np.int64),
-        share=frozen(best[:, TIME]),
-        lower=frozen(best[:, LOW]),
-        upper=frozen(best[:, UP]),
-        verdict=verdicts_of(proof.counts),
-        link_point=frozen(np.where(swapped, other, own)),
-        other_point=frozen(np.where(swapped, own, other)),
-    )

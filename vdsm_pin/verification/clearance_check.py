@@ -14,7 +14,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.brackets import LeastClearances
-from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
+from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import (
@@ -74,7 +74,7 @@ def check_clearance(
     """
     evidence = Evidence(
         pairs=proof.pairs,
-        least=least_clearances(proof),
+        least=proof.least,
         counts=proof.counts,
         deepest=lambda k, worst: is_deepest(worst, ball_of(problem, proof.pairs[k])),
         counterexamples=counterexamples,

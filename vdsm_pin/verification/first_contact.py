@@ -19,7 +19,7 @@ from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
+from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.protocols import AnyMotion
 from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.records import Pair
@@ -176,7 +176,7 @@ def arm_contacts(
     Raises:
         OutOfTime: If the time is over.
     """
-    whole = least_clearances(proof)
+    whole = proof.least
     if not (whole.verdict == REFUTED).any():
         return ()
     budget = Budget(until=deadline.end)

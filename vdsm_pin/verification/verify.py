@@ -23,7 +23,6 @@ from vdsm_pin.verification.best_effort import BestEffort, guarded
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
-    least_clearances,
     prove_clearance,
 )
 from vdsm_pin.verification.clearance_check import check_clearance
@@ -106,7 +105,7 @@ def verify(
     inside = pairs_inside(problem, all_pairs(problem), enclosed)
     proved = judgement.proved(inside, sinks, reach)
     proof = proved.proof
-    least = enclosed_least(least_clearances(proof), inside)
+    least = enclosed_least(proof.least, inside)
     counterexamples = judgement.counterexamples(proof)
     clear = bool(counterexamples) and judgement.is_nominally_clear()
     contacts = judgement.contacts(proved)
