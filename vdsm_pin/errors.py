@@ -285,7 +285,7 @@ class CutOff(Infeasible):
 
     Args:
         station: Arc length of that place along the desired path; [m].
-        narrowest: Where the widest way tried is shut, in words; may be empty.
+        narrowest: Where the best way is narrowest, in words; may be empty.
     """
 
     def __init__(self, *, station: float, narrowest: str = "") -> None:

@@ -10,7 +10,6 @@ from vdsm_pin.errors import (
     Infeasible,
     NoPlanFound,
     OutOfReach,
-    OutOfTime,
     PathBlocked,
     Reached,
 )
@@ -30,11 +29,7 @@ from vdsm_pin.planner.fewest.stuck import (
     too_narrow,
     where_stuck,
 )
-from vdsm_pin.planner.impossible.bounds import (
-    TipProof,
-    least_changed,
-)
-from vdsm_pin.planner.impossible.cut_off import narrowest
+from vdsm_pin.planner.impossible.bounds import least_changed
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import (
@@ -69,7 +64,7 @@ def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
     shut = _length(rows, _either_end(proof.closed))
     whole = problem.path.blocked is Blocked.FAIL
     if proof.closed.all() or (whole and shut > 0.0):
-        raise _proved(problem, rows, proof, deadline_of(outcome.judge.clearance))
+        raise _proved(problem, outcome)
 
 
 def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
@@ -107,16 +102,21 @@ def _length(rows: PathRows, picked: BoolArray) -> float:
     return float(np.diff(rows.stations)[picked].sum())
 
 
-def _proved(
-    problem: PlanningProblem, rows: PathRows, proof: TipProof, deadline: Deadline
-) -> Infeasible:
+def _proved(problem: PlanningProblem, outcome: Outcome) -> Infeasible:
+    rows, proof = outcome.rows, outcome.proof
     if proof.far.any():
         return _out_of_reach(problem, rows)
     if not proof.buried.any() and proof.hemmed_in.any():
         first = int(np.flatnonzero(proof.hemmed_in)[0])
         return HemmedIn(station=float(rows.stations[first]))
     if not proof.buried.any():
-        return _cut_off(problem, rows, proof, deadline)
+        first = int(np.flatnonzero(proof.cut_off)[0])
+        clearance = outcome.judge.clearance
+        passed = narrowest_passage(
+            problem, clearance, rows.tips[first], deadline_of(clearance)
+        )
+        words = "" if passed is None else passage(problem, passed.place)
+        return CutOff(station=float(rows.stations[first]), narrowest=words)
     first = int(np.flatnonzero(proof.buried)[0])
     name, least = nearest(problem, rows.tips[first])
     least -= float(problem.manipulator.axis_radii[-1])
@@ -146,39 +146,6 @@ def _out_of_reach(problem: PlanningProblem, rows: PathRows) -> OutOfReach:
         reach=reach,
         reason=reason,
     )
-
-
-def _cut_off(
-    problem: PlanningProblem, rows: PathRows, proof: TipProof, deadline: Deadline
-) -> Infeasible:
-    first = int(np.flatnonzero(proof.cut_off)[0])
-    place = _shut(problem, rows.tips[first], deadline)
-    words = ""
-    if place is not None:
-        problem = held_from(problem, TIP_ONLY)
-        clearances = upper_clearance(problem, np.stack([place, place])[None])[0]
-        scene, required = problem.scene.obstacles, problem.required_clearance
-        near = [o.name for o, r in zip(scene, clearances, strict=True) if r < required]
-        words = (
-            f"the widest way tried has at most {in_mm(clearances.min())} to "
-            f"{', '.join(map(repr, near))} at "
-            f"{problem.in_file(place)}, required are "
-            f"{in_mm(required)}"
-        )
-    return CutOff(station=float(rows.stations[first]), narrowest=words)
-
-
-def _shut(
-    problem: PlanningProblem, tip: FloatArray, deadline: Deadline
-) -> FloatArray | None:
-    """Where the widest way to a tip is shut, shape (3,); None where nobody knows."""
-    problem = held_from(problem, TIP_ONLY)
-    if not problem.scene.obstacles:
-        return None
-    try:
-        return narrowest(problem, tip, deadline)
-    except OutOfTime:  # what is told stands without it
-        return None
 
 
 def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:

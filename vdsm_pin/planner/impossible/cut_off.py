@@ -32,10 +32,6 @@ from vdsm_pin.tolerances import TOLERANCES
 
 MOST_CELLS: Final = 60_000
 """Cells at which a search ends; it has taken a second or two by then."""
-FINE: Final = 0.0032
-"""Size to which the narrowest place is told, over the arm's length; [-]."""
-CLOSER: Final = 60
-"""Rounds of coming closer to it."""
 LIGHT: Final = 0.02
 """Doubt of a cell whose centre is clear over that of another; [-]."""
 LIKELY: Final = 0.5
@@ -62,7 +58,6 @@ class _Cells(Octree):
         self.reach = curled_reach(arm) + beside
         ahead = arm.total_length + beside
         self.x_low, self.x_high = low - ahead, high + ahead
-        self.fine = FINE * arm.total_length
         side = max(self.x_high - self.x_low, 2.0 * self.reach)
         super().__init__(np.array([self.x_low, -side / 2.0, -side / 2.0]), side)
 
@@ -155,16 +150,13 @@ class _Cells(Octree):
         least = float(middle.min())
         return chosen[middle <= LIKELY * least] if least < 0.0 else chosen
 
-    def centre(self, number: int) -> FloatArray:
-        """Centre of a cell, shape (3,); [m]."""
-        one = slice(number, number + 1)
-        return np.asarray(self.boxes(self.codes[one], self.levels[one])[0][0])
-
 
 def cut_off(
     problem: PlanningProblem, tips: FloatArray, deadline: Deadline = NO_LIMIT
 ) -> BoolArray:
     """Which tips no way leads to from the start; proved, but not every such tip found.
+
+    Cells are halved until every tip is reached or cut off, or there are too many.
 
     Args:
         problem: Arm, scene, start, required clearance.
@@ -173,17 +165,6 @@ def cut_off(
 
     Returns:
         Shape (n,).
-
-    Raises:
-        OutOfTime: If the time is over.
-    """
-    return _decided(problem, tips, deadline)[1]
-
-
-def _decided(
-    problem: PlanningProblem, tips: FloatArray, deadline: Deadline
-) -> tuple[_Cells, BoolArray]:
-    """Cells halved until every tip is reached or cut off, or there are too many.
 
     Raises:
         OutOfTime: If the time is over.
@@ -201,46 +182,10 @@ def _decided(
         closed = ~np.isfinite(need)
         open_ = np.unique(goals[(need > 0.0) & ~closed])
         if not open_.size or cells.codes.size > MOST_CELLS:
-            return cells, np.asarray(closed)
+            return np.asarray(closed)
         through = there + doubt_to(open_, first, neighbours, doubt) - doubt
         good = (cells.state == DOUBTFUL) & (cells.levels < DEPTH)
         good &= through <= DETOUR * float(there[open_].min())
         if not good.any():
-            return cells, np.asarray(closed)
+            return np.asarray(closed)
         cells.split(cells.closest(np.flatnonzero(good)))
-
-
-def narrowest(
-    problem: PlanningProblem, tip: FloatArray, deadline: Deadline = NO_LIMIT
-) -> FloatArray | None:
-    """Where the widest way tried to a tip that is cut off is shut, shape (3,); [m].
-
-    An answer to show, not a proof: ways are compared cell by cell. None where no
-    obstacle is too close to the place found.
-
-    Raises:
-        OutOfTime: If the time is over.
-    """
-    cells, _ = _decided(problem, tip[None], deadline)
-    place = 0
-    for _ in range(CLOSER):
-        start_node, goal = (
-            cells.holders(problem.path.start[None]),
-            cells.holders(tip[None]),
-        )
-        within = np.isfinite(cells.middle)
-        lack = np.maximum(0.0, cells.middle / cells.inside)
-        # The fourth power makes the worst place on a way count for nearly all of it.
-        cost = np.where(within, cells.sizes() * (lack**4 + LIGHT**4), 0.0)
-        first, neighbours = adjoining(cells.codes, cells.levels, within)
-        through = doubt_to(start_node, first, neighbours, cost)
-        through += doubt_to(goal, first, neighbours, cost) - cost
-        on_route = np.flatnonzero(through <= DETOUR * through[goal[0]])
-        place = int(on_route[np.argmin(cells.middle[on_route])])
-        # Clear centres tell little of a cell that is larger than what it must keep.
-        large = (cells.sizes() > -cells.inside) & (cells.state == DOUBTFUL)
-        large |= (cells.sizes() > cells.fine) & (cells.middle < 0.0)
-        if not large[on_route].any() or cells.codes.size > MOST_CELLS:
-            break
-        cells.split(cells.closest(on_route[large[on_route]]))
-    return cells.centre(place) if cells.middle[place] < 0.0 else None
