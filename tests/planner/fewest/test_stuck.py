@@ -135,7 +135,8 @@ def test_what_keeps_an_arm_from_following_its_tip_is_named() -> None:
     )
     assert "max_link_angle_deg" in told.advice
     told = following(replace(task, manipulator=replace(arm, base_range=(-5, -2.5))), x)
-    assert "x0 = -2496.000 mm with the tip at (630.0, 0.0, 0.0) mm" in told.words
+    assert "its base at x0 = -2496.000 mm, and the rail is" in told.words
+    assert "with the tip at (630.0, 0.0, 0.0) mm" in told.words
     assert "rail" in told.advice
     told = following(task, x + np.clip(x[:, :1] - 0.3, 0.0, 0.05) * [0.0, 1.0, 0.0])
     assert re.search(r"leave link 8 \S+ mm to 'wall1' with the tip", told.words)

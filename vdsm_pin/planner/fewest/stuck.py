@@ -1,5 +1,6 @@
 """Where a search came to an end, what stopped it, and what might help."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -109,39 +110,37 @@ def following(problem: PlanningProblem, route: FloatArray) -> Following:
         problem: Arm and scene.
         route: Of the tip from its start on, shape (k, 3); [m].
     """
-    arm, who = problem.manipulator, "an arm that follows its tip along it"
-    laid = led_along(route, start_centres(problem), arm.link_lengths)
+    who = "an arm that follows its tip along it"
+    laid = led_along(route, start_centres(problem), problem.manipulator.link_lengths)
     for tip, centres in zip(route, laid, strict=True):
-        place = f"with the tip at {problem.in_file(tip)}"
-        if not np.isfinite(centres).all():
-            return Following(
-                f"{who} would not reach back to its rail {place}", "longer links"
-            )
-        bends = bends_of(centres[None])[0]
-        joint = int(np.argmax(bends))
-        if bends[joint] > arm.max_link_angle:
-            asked, limit = np.rad2deg([bends[joint], arm.max_link_angle])
-            return Following(
-                f"{who} would bend joint {joint + 1} by {asked:.1f} deg of {limit:.1f} "
-                f"deg {place}",
-                "a larger `max_link_angle_deg` or links shorter against the turn",
-            )
-        base, (low, high) = float(centres[0, 0]), arm.base_range
-        if not low <= base <= high:
-            return Following(
-                f"{who} would need its base at x0 = {in_mm(base)} {place}, and the "
-                f"rail is from {in_mm(low)} to {in_mm(high)}",
-                "a longer rail (`base_range`)",
-            )
-        found = culprit(problem, centres) if problem.scene.obstacles else None
-        if found and found.clearance < problem.required_clearance:
-            return Following(
-                f"{who} would leave {named(arm, found.link)} {found.words} to "
-                f"{found.obstacle!r} {place}",
-                f"links shorter against the turn there or more room at "
-                f"{found.obstacle!r}",
-            )
+        for words, advice in _broken(problem, centres):
+            place = problem.in_file(tip)
+            return Following(f"{who} would {words} with the tip at {place}", advice)
     return Following(f"{who} is clear at each of its points", "")
+
+
+def _broken(problem: PlanningProblem, centres: FloatArray) -> Iterator[tuple[str, str]]:
+    """What one arm, NaN for none, breaks of what is asked, and what might help."""
+    arm = problem.manipulator
+    if not np.isfinite(centres).all():
+        yield "not reach back to its rail", "longer links"
+        return
+    bends = bends_of(centres[None])[0]
+    joint = int(np.argmax(bends))
+    if bends[joint] > arm.max_link_angle:
+        asked, limit = np.rad2deg([bends[joint], arm.max_link_angle])
+        words = f"bend joint {joint + 1} by {asked:.1f} deg of {limit:.1f} deg"
+        yield words, "a larger `max_link_angle_deg` or links shorter against the turn"
+    base, (low, high) = float(centres[0, 0]), arm.base_range
+    if not low <= base <= high:
+        rail = f"from {in_mm(low)} to {in_mm(high)}"
+        words = f"need its base at x0 = {in_mm(base)}, and the rail is {rail},"
+        yield words, "a longer rail (`base_range`)"
+    found = culprit(problem, centres) if problem.scene.obstacles else None
+    if found and found.clearance < problem.required_clearance:
+        obstacle, link = repr(found.obstacle), named(arm, found.link)
+        advice = f"links shorter against the turn there or more room at {obstacle}"
+        yield f"leave {link} {found.words} to {obstacle}", advice
 
 
 def _needed(problem: PlanningProblem) -> float:
