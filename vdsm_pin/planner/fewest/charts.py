@@ -17,8 +17,6 @@ from vdsm_pin.planner.fewest.direction_kernels import (
 from vdsm_pin.planner.fewest.motion import is_directed, standing
 from vdsm_pin.planner.fewest.offset_kernels import SCALES, lined_up, mutated_offsets
 
-SETTLED: Final = 3
-"""Times arms are lined up and brought back onto the rail, which bends a little."""
 TURNS: Final = (0.02, 0.08, 0.25)
 """Sizes of a turn of links; [rad]."""
 
@@ -78,13 +76,24 @@ def settled(arm: Manipulator, tips: FloatArray, shapes: FloatArray) -> FloatArra
 
 
 def in_line(
-    arm: Manipulator, tips: FloatArray, shapes: FloatArray, joint: int
+    arm: Manipulator, tips: FloatArray, shapes: FloatArray, joint: int, way: int
 ) -> FloatArray:
-    """Arms with one joint in line with the bent joints before and after it."""
+    """Arms with one joint straight.
+
+    Args:
+        arm: The arm.
+        tips: Where they stay, shape (n, 3); [m].
+        shapes: Their shape coordinates.
+        joint: The joint, counted from 0.
+        way: 0 puts it in line between the bent joints before and after it. With 1 the
+            piece before it goes on to the next bent joint, which moves; with -1 the
+            piece after it goes back to the one before. Where that is an end of the arm,
+            or the joint is straight, nothing changes.
+    """
     if not is_directed(shapes):
-        return lined_up(shapes, arm.stations, joint)
-    for _ in range(SETTLED):
-        lined = lined_up_directions(shapes, arm.link_lengths, joint)
+        return lined_up(shapes, arm.stations, joint, way)
+    for one in (way, 0, 0):
+        lined = lined_up_directions(shapes, arm.link_lengths, joint, one)
         shapes = settled(arm, tips, lined)
     return shapes
 

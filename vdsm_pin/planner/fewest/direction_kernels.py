@@ -187,9 +187,9 @@ def _bends(axes: FloatArray, joint: int) -> bool:
 
 @compiled
 def lined_up_directions(
-    axes: FloatArray, lengths: FloatArray, joint: int
+    axes: FloatArray, lengths: FloatArray, joint: int, way: int
 ) -> FloatArray:
-    """Arms with one joint in line with the bent joints before and after it.
+    """Arms with one joint in line with its neighbours; see `charts.in_line`.
 
     The base may be off its rail.
 
@@ -197,6 +197,7 @@ def lined_up_directions(
         axes: Directions of the links, shape (n, N, 3); [-].
         lengths: Of the links, shape (N,); [m].
         joint: The joint, counted from 0.
+        way: As in `lined_up`.
 
     Returns:
         Shape (n, N, 3).
@@ -208,11 +209,16 @@ def lined_up_directions(
             low -= 1
         while high < lengths.size and not _bends(row, high):
             high += 1
-        chord = np.zeros(3)
-        for i in range(low, high):
-            chord += lengths[i] * row[i]
-        row[low:high] = chord
-        _normalised(row[low:high])
+        if way == 0:
+            chord = np.zeros(3)
+            for i in range(low, high):
+                chord += lengths[i] * row[i]
+            row[low:high] = chord
+            _normalised(row[low:high])
+        elif _bends(row, joint) and way > 0 and high < lengths.size:
+            row[joint:high] = row[joint - 1].copy()
+        elif _bends(row, joint) and way < 0 and low > 0:
+            row[low:joint] = row[joint].copy()
     return result
 
 

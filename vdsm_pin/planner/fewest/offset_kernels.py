@@ -110,22 +110,37 @@ def mutated_offsets(
 
 
 @compiled
-def lined_up(offsets: FloatArray, stations: FloatArray, joint: int) -> FloatArray:
-    """Arms with one joint in line with the bent joints before and after it.
+def lined_up(
+    offsets: FloatArray, stations: FloatArray, joint: int, way: int
+) -> FloatArray:
+    """Arms with one joint in line with its neighbours; see `charts.in_line`.
 
     Args:
         offsets: D_1..D_{N+1}, shape (n, N + 1, 2); [m].
         stations: Arc length of the joints, shape (N + 1,); [m].
         joint: The joint, counted from 0.
+        way: 0 between the bent joints before and after it; 1 where the piece before it
+            goes on, up to the next bent joint; -1 where the piece after it goes back.
 
     Returns:
         Shape (n, N + 1, 2); [m].
     """
-    result = offsets.copy()
-    bent = np.zeros(stations.size, dtype=np.bool_)
+    result, last = offsets.copy(), stations.size - 1
+    bent = np.zeros(last + 1, dtype=np.bool_)
     for r in range(offsets.shape[0]):
         row = result[r]
         _bent_joints(row, stations, bent)
         low, high = _bent_beside(bent, joint)
-        _line_up(row, stations, low, high, row[high].copy())
+        if way == 0:
+            _line_up(row, stations, low, high, row[high].copy())
+            continue
+        moved, fixed = (high, low) if way > 0 else (low, high)
+        if not bent[joint] or moved == 0 or moved == last:
+            continue
+        part = (stations[moved] - stations[fixed]) / (stations[joint] - stations[fixed])
+        place = row[fixed] + part * (row[joint] - row[fixed])
+        before, after = _bent_beside(bent, moved)
+        first, end = (low, after) if way > 0 else (before, high)
+        _line_up(row, stations, first, moved, place)
+        _line_up(row, stations, moved, end, row[end].copy())
     return result

@@ -1,19 +1,21 @@
 """Knees taken away from a motion along the path, as long as it stays clear.
 
-A joint is put in line with the bent joints before and after it, along as much of the
-path as keeps clearance and limits. Its neighbours bend more for it, so a gentle curve
-of many knees becomes a polygon of few.
+A joint is put in line with the bent joints before and after it, or with one of its
+neighbours, whose other end moves for it, along as much of the path as keeps clearance
+and limits. Its neighbours bend more for it, so a gentle curve of many knees becomes a
+polygon of few.
 """
 
+import itertools
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.planner.fewest.charts import coordinates, in_line
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, is_directed, standing
+from vdsm_pin.tolerances import TOLERANCES
 
 ROUNDS: Final = 3
 """Rounds over all joints."""
@@ -28,14 +30,14 @@ def sparser(judge: Judge, corners: Corners) -> Corners:
             of it can be.
     """
     corners = projected(judge, corners)
-    arm = judge.problem.manipulator
-    on = np.append(corners.drawn, False) | np.append(False, corners.drawn)
-    for _ in range(ROUNDS):
-        before = corners
-        for joint in range(1, arm.n_links):
-            corners = _without(judge, corners, joint, on)
-        if corners is before:
-            break
+    joints = range(1, judge.problem.manipulator.n_links)
+    for ways in ((0,), (1, -1, 0)):
+        for _ in range(ROUNDS):
+            before = corners
+            for joint, way in itertools.product(joints, ways):
+                corners = _without(judge, corners, joint, way)
+            if corners is before:
+                break
     return corners
 
 
@@ -53,31 +55,37 @@ def projected(judge: Judge, corners: Corners) -> Corners:
     return trial if clear.all() else corners
 
 
-def _without(judge: Judge, corners: Corners, joint: int, on: BoolArray) -> Corners:
-    """Corners with a joint straight where that can be; the same object if nowhere."""
-    arm = judge.problem.manipulator
-    trial = corners.offsets.copy()
-    rows = np.flatnonzero(on)
-    trial[rows] = in_line(arm, corners.tips[rows], corners.offsets[rows], joint)
-    _, before, _ = judge.look(corners.tips[rows], corners.offsets[rows])
-    clearances, after, _ = judge.look(corners.tips[rows], trial[rows])
-    better = np.zeros(len(on), dtype=np.bool_)
-    better[rows] = (clearances >= judge.required) & (after < before)
+def _without(judge: Judge, corners: Corners, joint: int, way: int) -> Corners:
+    """Corners with a joint straight where that can be; the same object if nowhere.
+
+    Args:
+        judge: Says what is clear.
+        corners: The motion.
+        joint: The joint, counted from 0.
+        way: How it is made straight, see `in_line`.
+    """
+    arm, tips = judge.problem.manipulator, corners.tips
+    on = np.append(corners.drawn, False) | np.append(False, corners.drawn)
     # The start is where it is.
-    better[0] = False
+    rows, trial = 1 + np.flatnonzero(on[1:]), corners.offsets.copy()
+    bent = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
+    rows, before = rows[bent[:, joint]], bent[bent[:, joint]].sum(axis=1)
+    trial[rows] = in_line(arm, tips[rows], trial[rows], joint, way)
+    after = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
+    rows = rows[after.sum(axis=1) < before]
+    clearances, _, _ = judge.look(tips[rows], trial[rows])
+    better = np.zeros(len(on), dtype=np.bool_)
+    better[rows] = clearances >= judge.required
+    asked = better
     while better.any():
         offsets = np.where(better[:, None, None], trial, corners.offsets)
         changed = replace(corners, offsets=offsets)
-        touched = np.flatnonzero(better[:-1] | better[1:])
-        bad = touched[~judge.clear(judge.lines(changed, touched))]
+        touched = (better[:-1] | better[1:]) & (asked[:-1] | asked[1:])
+        intervals = np.flatnonzero(touched)
+        bad = intervals[~judge.clear(judge.lines(changed, intervals))]
         if not len(bad):
             return changed
-        better = _narrowed(better, bad)
+        kept = better.copy()
+        kept[bad] = kept[bad + 1] = False
+        better, asked = kept, better & ~kept
     return corners
-
-
-def _narrowed(better: BoolArray, bad: IntArray) -> BoolArray:
-    """Corners to change, without those at intervals that are not clear."""
-    kept = better.copy()
-    kept[bad] = kept[bad + 1] = False
-    return kept
