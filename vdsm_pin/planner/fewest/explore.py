@@ -18,7 +18,14 @@ from vdsm_pin.planner.fewest.grown_nodes import fill
 from vdsm_pin.planner.fewest.insertion import insert, tip_space
 from vdsm_pin.planner.fewest.joint_error import link_margins
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.levels import FULL, SEED, Effort, Insert, Search
+from vdsm_pin.planner.fewest.levels import (
+    FULL,
+    SEED,
+    Effort,
+    Insert,
+    Search,
+    confined_first,
+)
 from vdsm_pin.planner.fewest.roadmap import (
     CostWeights,
     Roadmap,
@@ -130,7 +137,11 @@ def explore(
     stuck: NoWayOut | None = None
     inserted: Stuck | None = None
     spaces: dict[tuple[float, float, int], TipSpace] = {}
-    for level in effort.levels:
+    levels, proofs = effort.levels, [_cut_off, _hemmed_in] if effort.proves else []
+    while levels:
+        if best.found is None:
+            levels = confined_first(levels)
+        level, levels = levels[0], levels[1:]
         ease = max(level.ease, least_ease)
         worth = problem.required_clearance + margin
         worth += (level.slack + weights.clearance) * length
@@ -159,13 +170,12 @@ def explore(
         yield best
         if not best.missing > 0.0 or (best.found is not None and soon.passed):
             return
-        if level is first and effort.proves:
+        if proofs and (level is first or isinstance(level, Insert)):
             # Seldom needed, so only now: can it be done at all?
-            for proof in _proofs(problem, clearance, best):
-                best = replace(best, proof=proof)
-                yield best
-            proof = best.proof
-            if best.proof.closed.all():
+            proof = proofs.pop(0)(problem, clearance, best)
+            best = replace(best, proof=proof)
+            yield best
+            if proof.closed.all():
                 return
     if best.found is None and inserted is None and stuck is not None:
         raise stuck
@@ -214,20 +224,25 @@ def _once_inserted(
     return replace(before, found=now.found, stuck=now.stuck or before.stuck)
 
 
-def _proofs(
+def _cut_off(
     problem: PlanningProblem, clearance: BroadPhase, outcome: Outcome
-) -> Iterator[TipProof]:
-    """More and more that is proved about what is not drawn."""
+) -> TipProof:
+    """What is proved, with rows that no way of the tip leads to."""
+    there, tips = held_from(problem, TIP_ONLY), outcome.rows.tips
+    return replace(outcome.proof, cut_off=cut_off(there, tips, clearance.deadline))
+
+
+def _hemmed_in(
+    problem: PlanningProblem, clearance: BroadPhase, outcome: Outcome
+) -> TipProof:
+    """What is proved, with rows not drawn where the last link has no room."""
     tips, proof = outcome.rows.tips, outcome.proof
     open_ = np.flatnonzero(~(outcome.drawn | proof.closed))
     hemmed = np.zeros(len(tips), dtype=np.bool_)
     enough = clearance.up_to(problem.required_clearance)
     there = held_from(problem, last_link(problem))
     hemmed[open_] = hemmed_in(there, enough, tips[open_])
-    proof = replace(proof, hemmed_in=hemmed)
-    yield proof
-    problem = held_from(problem, TIP_ONLY)
-    yield replace(proof, cut_off=cut_off(problem, tips, clearance.deadline))
+    return replace(proof, hemmed_in=hemmed)
 
 
 def _look(

@@ -100,12 +100,20 @@ def _both(population: int, routes: int, backtracks: int, seed: int) -> list[Inse
     return [one, replace(one, directed=True)]
 
 
+BESIDE: Final = Search(rounds=20, back=1.0, grow=2)
+"""The first search with tips behind and beside the path."""
+
+FIRST: Final = (
+    Insert(population=10, routes=1, backtracks=2, seed=0, cells=60_000),
+    Insert(population=10, routes=2, backtracks=3, seed=0, cells=60_000, directed=True),
+)
+"""The first insertions."""
+
 THOROUGH: Final[tuple[Level, ...]] = (
     Search(rounds=20, back=0.0, grow=1, ease=0.79, around=4),
     Search(rounds=40, back=0.0, grow=2, around=4),
-    Search(rounds=20, back=1.0, grow=2),
-    Insert(population=10, routes=1, backtracks=2, seed=0, cells=60_000),
-    Insert(population=10, routes=2, backtracks=3, seed=0, cells=60_000, directed=True),
+    BESIDE,
+    *FIRST,
     *_both(population=30, routes=3, backtracks=4, seed=1),
     Search(rounds=60, back=1.0, grow=3, fine=True),
     *_both(population=60, routes=4, backtracks=5, seed=2),
@@ -121,13 +129,23 @@ fine. The numbers were found by trial on the paper's problems and HRM-2000.
 """
 
 
+def confined_first(levels: tuple[Level, ...]) -> tuple[Level, ...]:
+    """Levels to come where nothing is drawn yet: the first insertions before `BESIDE`.
+
+    Where the path is confined, these draw it sooner.
+    """
+    if levels[:3] == (BESIDE, *FIRST):
+        return (*FIRST, BESIDE, *levels[3:])
+    return levels
+
+
 @dataclass(frozen=True)
 class Effort:
     """How much is done for a plan.
 
     Args:
         levels: How finely to look, in this order.
-        proves: Whether what the first level leaves is looked at for a proof that it
+        proves: Whether what levels leave is looked at for a proof that it
             cannot be done.
     """
 
