@@ -142,7 +142,8 @@ def test_a_mesh_is_covered_by_as_many_hulls_as_are_asked_for(
     ))  # fmt: skip
 
     def covered(over: list[int] | None) -> list[Any]:
-        return [*Model._covered(asked, "l", corners, over)]  # type: ignore[arg-type]
+        place = np.eye(3), np.zeros(3)
+        return [*Model._covered(asked, "l", corners, place, over)]  # type: ignore[arg-type]
 
     (whole,) = covered(None)
     assert len(whole.points) == 1

@@ -12,7 +12,13 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import FEED, PART, Manipulator
 from vdsm_pin.arm.mounted import LinkBody
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct_rows
+from vdsm_pin.geometry.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    distinct_rows,
+)
+from vdsm_pin.geometry.closed_meshes import closed_parts
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece, ends_of
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import pack_pieces
@@ -133,9 +139,10 @@ def covering_points(
 ) -> Iterator[FloatArray]:
     """Points of hulls that hold triangles and, of a solid, what they enclose.
 
-    Hulls of a solid that are near one another have a point in common. Tetrahedra over
-    the triangles of a closed surface that have their tip there wind round any point as
-    often as the surface does: each point of its inside is in one of them.
+    Hulls of one closed surface have a point in common. Tetrahedra over its triangles
+    that have their tip there wind round any point as often as the surface does: each
+    point of its inside is in one of them. Where a mesh has gaps, what lies across them
+    is of one surface.
 
     Args:
         corners: Of the triangles, shape (m, 3, 3); [m].
@@ -149,7 +156,7 @@ def covering_points(
     if not solid or len(groups) == 1:
         yield from found
         return
-    together = _near(found)
+    together = _of_one_surface(corners, groups)
     counts = np.array([len(points) for points in found])
     sums = np.array([points.sum(axis=0) for points in found])
     tips = (together @ sums) / (together @ counts)[:, None]
@@ -157,25 +164,48 @@ def covering_points(
         yield np.vstack([points, tip])
 
 
-def _near(found: Sequence[FloatArray]) -> BoolArray:
-    """Which groups of points are near, or near one that is, and so on, (k, k).
+def _of_one_surface(corners: FloatArray, groups: Sequence[IntArray]) -> BoolArray:
+    """Which groups have triangles of one surface, or of those of one that has, (k, k).
 
-    Triangles that share an edge, or are joined there over a gap, are of such groups.
+    Where the mesh is open, its triangles may be joined if they are near.
     """
-    low = np.array([points.min(axis=0) for points in found])
-    high = np.array([points.max(axis=0) for points in found])
-    gap = NEAR * float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
-    reaches = (low[:, None] <= high + gap).all(axis=2)
-    near = np.asarray(reaches & reaches.T)
+    if (part := closed_parts(corners)) is not None:
+        has = np.zeros((len(groups), int(part.max()) + 1), np.float32)
+        for k, group in enumerate(groups):
+            has[k, part[group]] = 1.0
+        near = has @ has.T > 0.0
+    else:
+        low, high = (
+            np.array([end(corners[group], axis=(0, 1)) for group in groups])
+            for end in (np.min, np.max)
+        )
+        gap = NEAR * float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
+        reaches = (low[:, None] <= high + gap).all(axis=2)
+        near = np.asarray(reaches & reaches.T)
     while (near != (farther := near @ near)).any():
         near = farther
     return near
 
 
 def grouped(corners: FloatArray, parts: int) -> tuple[IntArray, ...]:
-    """Numbers of triangles (n, 3, 3) in so many groups of neighbours, at most n."""
-    order = coherent_order(corners.mean(axis=1))
-    return tuple(np.array_split(order, min(parts, len(order))))
+    """Numbers of triangles (n, 3, 3) in so many groups of neighbours, at most n.
+
+    A closed surface has groups of its own where there are enough for all.
+    """
+    parts = min(parts, len(corners))
+    part = closed_parts(corners) if parts > 1 else None
+    sizes = np.bincount(np.zeros(len(corners), int) if part is None else part)
+    if part is None or len(sizes) > parts:
+        part, sizes = np.zeros(len(corners), int), np.array([len(corners)])
+    counts = np.ones_like(sizes)
+    while counts.sum() < parts:
+        counts[np.argmax(sizes / counts)] += 1
+    found: list[IntArray] = []
+    for k, count in enumerate(counts.tolist()):
+        rows = np.flatnonzero(part == k)
+        order = coherent_order(corners[rows].mean(axis=1))
+        found += np.array_split(rows[order], count)
+    return tuple(found)
 
 
 def outer_points(points: FloatArray) -> FloatArray:

@@ -40,9 +40,8 @@ def own_bodies(arm: Any) -> Iterator[Body]:
     last, tip = len(ends), ends[-1]
     ends[-1] = tip - tool.length if tool else tip
     radii = [arm.link_radius] * last if radii is None else radii.tolist()
-    rows = [
-        (f"link {i}", i, 0.0, ends[i - 1], radii[i - 1]) for i in range(1, last + 1)
-    ]
+    spans = enumerate(zip(ends, radii, strict=True), start=1)
+    rows = [(f"link {i}", i, 0.0, *both) for i, both in spans]
     rows += [("tool", last, ends[-1], tip, tool.radius)] if tool else []
     rows += [("feed", 0, -arm.feed.length, 0.0, arm.feed.radius)] if arm.feed else []
     for name, link, start, end, radius in rows:

@@ -54,8 +54,8 @@ class Surface:
         claim(self.gap <= 1.001 * GAP * self.size, "corners far apart are joined")
         self.at = np.concatenate([self.at, thin[:, :3].reshape(-1)])
 
-    def not_outside(self, point: Any, radius: float) -> str:
-        """Why a point of the arm's axis is not proved outside; empty where it is."""
+    def closed(self) -> tuple[Any, ...]:
+        """What `covers` says of the triangles, which have three corners, and those."""
         rows = self.names[self.at].reshape(-1, 3)
         corners = self.given[self.at].reshape(-1, 3, 3)
         whole = (rows != np.roll(rows, 1, axis=1)).all(axis=1)
@@ -65,12 +65,17 @@ class Surface:
             signed, single, turned = covers(rows, kept, count)
             if signed.any() or single.any():
                 break
-        else:
+        return signed, single, turned, whole, corners[whole]
+
+    def not_outside(self, point: Any, radius: float) -> str:
+        """Why a point of the arm's axis is not proved outside; empty where it is."""
+        signed, single, turned, whole, corners = self.closed()
+        if not (signed | single).any():
             return "the mesh is not closed"
         if self.gap and not self.gap < 0.999 * radius:
             return "its gaps are as wide as the arm"
         seen: set[float] = set()
-        for triangle, sense, place in crossings(corners[whole], point):
+        for triangle, sense, place in crossings(corners, point):
             if not triangle.size:
                 return ""
             here = np.flatnonzero(whole)[triangle]

@@ -208,13 +208,15 @@ class Model:
     def solids(self, link: ET.Element, name: str, covers: Any) -> Iterator[Solid]:
         """The convex pieces of a link; of each mesh as the certificate has it."""
         for collision in link.findall("collision"):
-            place = np.array([[*map(float, row)] for row in placed(collision)])
-            turn, shift = place[:, :3], place[:, 3]
+            *axes, shift = np.array([[*map(float, x)] for x in placed(collision)]).T
             for shape in collision.findall("geometry/*"):
                 if shape.tag == "mesh":
-                    corners = self._triangles(shape) @ turn.T + shift
+                    mesh = read_mesh(self._mesh(shape))
+                    scale = np.array(numbers(shape.get("scale", "1 1 1")))
+                    points = mesh.vertices * scale * (mesh.unit or 1.0)
                     cover = covers.pop(0) if covers else None
-                    yield from self._covered(name, corners, cover)
+                    place, corners = (axes, shift), points[mesh.triangles]
+                    yield from self._covered(name, corners, place, cover)
                     continue
                 words = (shape.get(x, "0") for x in ("size", "radius", "length"))
                 size, radius, length = (np.array(numbers(word)) for word in words)
@@ -222,21 +224,16 @@ class Model:
                 points = points.get(shape.tag, np.array([-Z, Z]) * length / 2)
                 far = np.abs(points).max() + np.abs(shift).max()
                 round_ = radius[0] if shape.tag == "cylinder" else 0.0
-                grown, disc = radius[0] - round_, (turn[:, 2], round_)
-                yield Solid(name, [points @ turn.T + shift], far, grown, disc)
+                grown, disc = radius[0] - round_, (axes[2], round_)
+                yield Solid(name, [points @ axes + shift], far, grown, disc)
         claim(not covers, f"{name} has fewer meshes than are told of")
 
-    def _triangles(self, shape: ET.Element) -> Any:
-        """Corners of a mesh in the frame of its place, shape (n, 3, 3); [m]."""
-        mesh = read_mesh(self._mesh(shape))
-        scale = np.array(numbers(shape.get("scale", "1 1 1"))) * (mesh.unit or 1.0)
-        return (mesh.vertices * scale)[mesh.triangles]
-
-    def _covered(self, name: str, corners: Any, cover: Any) -> Iterator[Solid]:
+    def _covered(self, name: str, corners: Any, place: Any, cover: Any) -> Any:
         """Convex solids that hold a mesh in the way that the problem asks for."""
-        asked, far = self.files.solids, np.abs(corners).max()
+        (axes, shift), asked = place, self.files.solids
+        far = np.abs(corners).max() + np.abs(shift).max()
         if asked.cover == "primitives":
-            yield primitive(name, corners.reshape(-1, 3), cover)
+            yield primitive(name, corners.reshape(-1, 3) @ axes + shift, cover)
             return
         most = asked.parts if asked.cover == "parts" else 1
         over = np.array([0] * len(corners) if cover is None else cover)
@@ -244,7 +241,7 @@ class Model:
         claim(good, f"{name}: expected a hull of at most {most} over each triangle")
         groups = [np.flatnonzero(over == k) for k in np.unique(over)]
         for points in hulls(name, corners, groups):
-            yield Solid(name, [points], far)
+            yield Solid(name, [points @ axes + shift], far)
 
 
 class Link(NamedTuple):

@@ -136,19 +136,24 @@ def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
 def hulls(name: str, corners: Any, groups: Any, inside: bool = True) -> list[Any]:
     """Corners of hulls of groups of triangles (n, 3, 3), which are all of them.
 
-    To hold the inside too, those whose boxes are near one another have a point in
-    common: the tetrahedra over a closed surface that have their tip there wind round
-    any point as often as the surface does, and what is far apart shares no edge.
+    To hold the inside too, those of one surface have a point in common: the tetrahedra
+    over a closed surface that have their tip there wind round any point as often as the
+    surface does. Each edge of a closed mesh has its partners where its corners are; of
+    an open one they are near.
     """
     every = range(len(corners))
     groups = [every] if groups is None else groups[:MAX_PARTS]
     missing = {*every} - {k for group in groups for k in group}
     claim(not missing, f"pieces of {name} do not make up the whole")
-    found = [corners[np.array(group, dtype=int)].reshape(-1, 3) for group in groups]
+    groups = [np.array(group, dtype=int) for group in groups]
+    found = [corners[group].reshape(-1, 3) for group in groups]
     low, high = (np.array([f(one, axis=0) for one in found]) for f in (np.min, np.max))
     gap = np.linalg.norm(high.max(axis=0) - low.min(axis=0)) / 1000
     near = ((low[:, None] <= high + gap) & (low <= high[:, None] + gap)).all(axis=2)
-    near = np.linalg.matrix_power(near, MAX_PARTS)  # or near to one that is, and so on
+    if inside and len(groups) > 1 and np.any((mesh := Surface(corners)).closed()[:2]):
+        sets = [{*mesh.names.reshape(-1, 3)[group].flat} for group in groups]
+        near = np.array([[not one.isdisjoint(x) for x in sets] for one in sets])
+    near = np.linalg.matrix_power(near, MAX_PARTS)  # or of one with one that is
     tips = near @ np.array([[*one.sum(axis=0), len(one)] for one in found])
     tips = tips[:, :3] / tips[:, 3:] if inside else np.zeros((len(found), 0, 3))
     return [np.unique(np.vstack(x), axis=0) for x in zip(found, tips, strict=True)]
@@ -247,13 +252,9 @@ def solid(obstacle: Any, told: Any = None) -> Any:
                 return Solid(name, ends, radius=radius)
             axis = unit(column(*obstacle.axis.tolist())).entries()
             return Solid(name, ends, disc=([*map(float, axis)], radius))
-        case solids.Box():
-            corners = CUBE * obstacle.half_size @ obstacle.rotation.T + obstacle.centre
-            return Solid(name, [corners], obstacle.centre)
-        case solids.Voxels():
+        case solids.Box(centre=at) | solids.Voxels(centres=at):
             corners = CUBE * obstacle.half_size @ obstacle.rotation.T
-            corners = obstacle.centres[:, None] + corners
-            return Solid(name, corners, obstacle.centres)
+            return Solid(name, np.atleast_2d(at)[:, None] + corners, at)
         case solids.Prism():
             flat = [[[*uv, s] for uv in obstacle.polygon] for s in obstacle.span]
             both = obstacle.origin + np.array(flat) @ obstacle.rotation.T

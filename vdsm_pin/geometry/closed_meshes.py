@@ -106,19 +106,39 @@ def close_mesh(vertices: FloatArray, triangles: IntArray) -> ClosedMesh:
         triangles: Vertex numbers, shape (m, 3), m >= 1.
     """
     search = _Search(vertices, vertices[triangles])
-    names = welded(vertices, triangles)[triangles]
-    every = np.ones(len(names), np.bool_)
-    found = search.closed(names, every)
-    if found is not None:
-        return found
-    flat = _heights(search.corners) <= TOLERANCES.mesh_flat * search.size
-    if flat.any():
-        found = search.closed(names, ~flat)
+    names, flat = welded(vertices, triangles)[triangles], search.flat
+    found = search.closed_as_given(names)
     for share in FINER if found is None else ():
         found = search.joined(names, ~flat, share * search.most)
         if found is not None:
             return found
     return search.open_mesh(names, ~flat) if found is None else found
+
+
+def closed_parts(corners: FloatArray) -> IntArray | None:
+    """Which closed surface each triangle is of, where there is nothing to join.
+
+    Triangles that share a corner are of the same one, and so on: each edge of a closed
+    mesh has its partners within one of them, which therefore closes by itself.
+
+    Args:
+        corners: Of the triangles, shape (m, 3, 3); [m].
+
+    Returns:
+        Numbers from 0, shape (m,); None where the mesh is open as it is given.
+    """
+    points = corners.reshape(-1, 3)
+    rows = np.arange(len(points)).reshape(-1, 3)
+    names = welded(points, rows)[rows]
+    if _Search(points, corners).closed_as_given(names) is None:
+        return None
+    label = np.arange(len(points))
+    while True:
+        least = label[names].min(axis=1)
+        np.minimum.at(label, names, least[:, None])
+        label = label[label]
+        if (label[names] == least[:, None]).all():
+            return np.asarray(np.unique(least, return_inverse=True)[1])
 
 
 @dataclass(frozen=True)
@@ -143,9 +163,18 @@ class _Search:
         """The largest gap that is joined; [m]."""
         return TOLERANCES.mesh_gap * self.size
 
-    def closed(self, names: IntArray, kept: BoolArray) -> ClosedMesh | None:
-        """The surface that kept triangles make as they are."""
-        return self._covered(names, counted(names, kept), 0.0)
+    @cached_property
+    def flat(self) -> BoolArray:
+        """Which triangles have no area, shape (m,)."""
+        return _heights(self.corners) <= TOLERANCES.mesh_flat * self.size
+
+    def closed_as_given(self, names: IntArray) -> ClosedMesh | None:
+        """The surface of all triangles, or of those that have an area, as they are."""
+        every = np.ones(len(names), np.bool_)
+        found = self._covered(names, counted(names, every), 0.0)
+        if found is None and self.flat.any():
+            found = self._covered(names, counted(names, ~self.flat), 0.0)
+        return found
 
     def joined(self, names: IntArray, kept: BoolArray, gap: float) -> ClosedMesh | None:
         """The same with corners joined that are no farther apart than a gap."""

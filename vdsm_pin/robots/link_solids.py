@@ -89,14 +89,17 @@ class LinkReader:
                     ends = np.array([shift - along, shift + along])
                     yield Hull(ends, float(shape.get("radius", "")))
                 case "mesh":
-                    corners = shift + self._triangles(link, shape) @ turn.T
-                    yield from self._cover(link, corners)
+                    corners = self._triangles(link, shape)
+                    yield from self._cover(link, corners, placement)
 
-    def _cover(self, link: str, corners: FloatArray) -> Iterator[LinkPiece]:
-        """Pieces that hold all triangles, shape (n, 3, 3)."""
+    def _cover(
+        self, link: str, corners: FloatArray, placement: FloatArray
+    ) -> Iterator[LinkPiece]:
+        """Pieces that hold all triangles, (n, 3, 3), where T_link_mesh places them."""
+        turn, shift = placement[:3, :3], placement[:3, 3]
         covers = self.covers.setdefault(link, [])
         if self.solids.cover == "primitives":
-            around = covering_primitive(corners.reshape(-1, 3))
+            around = covering_primitive(shift + corners.reshape(-1, 3) @ turn.T)
             covers.append(around)
             yield around
             return
@@ -104,7 +107,7 @@ class LinkReader:
         groups = grouped(corners, count)
         covers.append(groups)
         for points in covering_points(corners, groups):
-            yield covering_hull(distinct_rows(points))
+            yield covering_hull(distinct_rows(shift + points @ turn.T))
 
     def _triangles(self, link: str, shape: ET.Element) -> FloatArray:
         """The corners of a link's mesh, scaled, shape (n, 3, 3); [m]."""
