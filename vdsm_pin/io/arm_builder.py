@@ -1,7 +1,6 @@
 """The arm of a problem file to a `Manipulator`, in metres and radians."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final, TypeAlias, cast
 
 import numpy as np
@@ -9,14 +8,13 @@ import numpy as np
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.manipulator import BUILT_IN, FEED, TOOL, Manipulator, built_in
 from vdsm_pin.arm.mounted import BodySolid, Feed, LinkBody, Tool
-from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import arm_schema as schema
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
-from vdsm_pin.io.source import Digest
+from vdsm_pin.io.reading import Reading
 from vdsm_pin.io.urdf_arm import read_urdf_arm
-from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
 
@@ -34,21 +32,13 @@ ArmModel: TypeAlias = str | schema.ManipulatorModel | schema.UrdfManipulatorMode
 
 
 @dataclass(frozen=True)
-class ArmBuilder:
+class ArmBuilder(Reading):
     """Converts an arm.
 
     Args:
-        document: The file, for messages.
-        frame: Its unit and base.
-        folder: Where relative paths start.
-        digest: Gets the bytes of the files that the arm names.
         at: Where the arm stands in the file.
     """
 
-    document: YamlDocument
-    frame: Frame
-    folder: Path
-    digest: Digest
     at: Location = ("manipulator",)
 
     def build(self, model: ArmModel) -> Manipulator:
@@ -60,7 +50,7 @@ class ArmBuilder:
         if isinstance(model, str):
             if model not in BUILT_IN:
                 problem = f"is {model!r}; known: {', '.join(BUILT_IN)}, or a mapping"
-                raise self.document.invalid(self.at, problem)
+                raise self.invalid(self.at, problem)
             return built_in(model)
         if isinstance(model, schema.UrdfManipulatorModel):
             return self._from_urdf(model)
@@ -77,10 +67,10 @@ class ArmBuilder:
             low, high = (float(x) for x in self.frame.metres(model.base_range))
             if not low <= high:
                 problem = f"is {model.base_range}, expected the smaller value first"
-                raise self.document.invalid((*self.at, "base_range"), problem)
+                raise self.invalid((*self.at, "base_range"), problem)
         self._check_extent(float(lengths.sum()), max(-low, high))
         thinnest = float(np.min(model.link_radius))
-        try:
+        with self.document.naming(self.at):
             return Manipulator(
                 model.name,
                 lengths,
@@ -95,18 +85,14 @@ class ArmBuilder:
                 bodies=bodies,
                 ignore_pairs=tuple((a, b) for a, b in model.ignore_pairs),
             )
-        except InvalidInput as error:
-            raise self.document.invalid(self.at, str(error)) from None
 
     def _radii(self, model: schema.ManipulatorModel) -> FloatArray:
         """Radius of every link; [m]."""
         count = len(model.link_lengths)
         if not isinstance(model.link_radius, list):
             return np.full(count, self.frame.metres(model.link_radius))
-        if len(model.link_radius) != count:
-            found = len(model.link_radius)
-            problem = f"has {found} values, expected {count}, one per link"
-            raise self.document.invalid((*self.at, "link_radius"), problem)
+        at = (*self.at, "link_radius")
+        self.check_count(at, model.link_radius, count, "values, one per link")
         return self.frame.metres(model.link_radius)
 
     def _feed(self, model: schema.ManipulatorModel, radius: float) -> Feed | None:
@@ -125,14 +111,13 @@ class ArmBuilder:
         for i, body in enumerate(model.bodies):
             if body.link > count:
                 problem = f"is {body.link}, expected 1 to {count}"
-                raise self.document.invalid((*at, i, "link"), problem)
+                raise self.invalid((*at, i, "link"), problem)
             if body.name in (TOOL, FEED):
                 problem = f"is {body.name!r}, which the arm's own is called"
-                raise self.document.invalid((*at, i, "name"), problem)
+                raise self.invalid((*at, i, "name"), problem)
         frame = Frame(self.frame.unit, np.eye(3), np.zeros(3))
-        reader = ObstacleBuilder(
-            self.document, self.folder, frame, arm_length, self.digest, "its joint"
-        )
+        known = self.document, frame, self.folder, self.digest
+        reader = ObstacleBuilder(*known, arm_length, "its joint")
         solids = cast("tuple[BodySolid, ...]", reader.build_all(model.bodies, at))
         parts = (getattr(body, "parts", 1) for body in model.bodies)
         links = (body.link for body in model.bodies)
@@ -146,7 +131,7 @@ class ArmBuilder:
         self._check_extent(float(found.link_lengths.sum()), max(-low, high))
         unit = UNITS_PER_METRE[self.frame.unit]
         lengths = (unit * found.link_lengths).tolist()
-        try:
+        with self.document.naming((*self.at, "urdf")):
             return Manipulator(
                 found.name,
                 found.link_lengths,
@@ -156,8 +141,6 @@ class ArmBuilder:
                 found.base_range,
                 self._cables(model.cables, lengths, unit * found.link_radius),
             )
-        except InvalidInput as error:
-            raise self.document.invalid((*self.at, "urdf"), str(error)) from None
 
     def _check_extent(self, length: float, stroke: float) -> None:
         """Distances are proved within a stated extent only, so the arm stays there."""
@@ -168,7 +151,7 @@ class ArmBuilder:
                 f"{self.frame.shown(stroke)} out; expected at most "
                 f"{self.frame.shown(limit)} together"
             )
-            raise self.document.invalid(self.at, problem)
+            raise self.invalid(self.at, problem)
 
     def _cables(
         self,
@@ -188,18 +171,16 @@ class ArmBuilder:
                 problem = (
                     f"is {hole_radius:g}, expected below the body radius {radius:g}"
                 )
-                raise self.document.invalid((*at, "hole_radius"), problem)
+                raise self.invalid((*at, "hole_radius"), problem)
             if not 2.0 * half_gap < shortest:
                 problem = (
                     f"is {half_gap:g}, expected below half the shortest link "
                     f"{shortest:g}"
                 )
-                raise self.document.invalid((*at, "half_gap"), problem)
+                raise self.invalid((*at, "half_gap"), problem)
             if cables.hole_angles_deg is not None:
-                if len(cables.hole_angles_deg) != count:
-                    found = len(cables.hole_angles_deg)
-                    problem = f"has {found} rows, expected {count}, one per link"
-                    raise self.document.invalid((*at, "hole_angles_deg"), problem)
+                at, rows = (*at, "hole_angles_deg"), cables.hole_angles_deg
+                self.check_count(at, rows, count, "rows, one per link")
                 angles = radians(cables.hole_angles_deg)
         metres = self.frame.metres([hole_radius, half_gap])
         return CableLayout(float(metres[0]), float(metres[1]), angles)

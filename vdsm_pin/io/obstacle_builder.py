@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
@@ -20,10 +20,10 @@ from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.mesh_size import MeshSize
 from vdsm_pin.io.motion_builder import FLOATING, rigid_carrier
 from vdsm_pin.io.motion_schema import MotionModel, MovableModel
+from vdsm_pin.io.reading import Reading
 from vdsm_pin.io.source import Digest
-from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.problem import scene
-from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
 
 T = TypeVar("T")
@@ -41,24 +41,16 @@ def unit_vector(vector: FloatArray) -> FloatArray | None:
     return np.asarray(scaled / np.linalg.norm(scaled))
 
 
-@dataclass
-class ObstacleBuilder:
+@dataclass(frozen=True)
+class ObstacleBuilder(Reading):
     """Converts the obstacles of one file.
 
     Args:
-        document: The file, for messages.
-        folder: Where relative mesh paths start.
-        frame: The file's unit and pose.
         arm_length: For judging the size of a mesh; [m].
-        digest: Gets the bytes of the mesh files, in the order of the solids.
         origin: What the frame's origin is called.
     """
 
-    document: YamlDocument
-    folder: Path
-    frame: Frame
     arm_length: float
-    digest: Digest
     origin: str = "the base"
 
     def build_scene(
@@ -77,7 +69,7 @@ class ObstacleBuilder:
         for i, model in enumerate(models):
             if arm.owner_of(model.name) in arm.body_names:
                 problem = f"is {model.name!r}, which a body of the arm is called"
-                raise self.document.invalid(("obstacles", i, "name"), problem)
+                raise self.invalid(("obstacles", i, "name"), problem)
         return scene.Scene(obstacles)
 
     def build_all(
@@ -96,29 +88,26 @@ class ObstacleBuilder:
         for i, model in enumerate(models):
             if _LINK_NAME.fullmatch(model.name):
                 problem = f"is {model.name!r}, which is how links of the arm are named"
-                raise self.document.invalid((*at, i, "name"), problem)
+                raise self.invalid((*at, i, "name"), problem)
             if model.name in first:
                 problem = (
                     f"is {model.name!r}, which {at[-1]}[{first[model.name]}] is "
                     "called already; names are unique"
                 )
-                raise self.document.invalid((*at, i, "name"), problem)
+                raise self.invalid((*at, i, "name"), problem)
             first[model.name] = i
         solids = (self._checked(model, (*at, i)) for i, model in enumerate(models))
         return tuple(solids)
 
     def _checked(self, model: Any, at: Location) -> scene.Obstacle:
         motion: MotionModel | None = getattr(model, "motion", None)
-        try:
+        with self.document.naming(at):
             if motion is None:
                 obstacle: scene.Obstacle = self.build(model, at)
             else:
                 obstacle = self._moving(model, motion, at)
-        except InvalidFile:
-            raise
-        except InvalidInput as error:
-            raise self.document.invalid(at, str(error)) from None
-        self._check_extent(obstacle, at)
+        reach, what = scene.reach_of(obstacle), f"{obstacle.name!r} reaches"
+        self.check_extent(at, reach, what, self.origin)
         return obstacle
 
     def _moving(self, model: Any, motion: MotionModel, at: Location) -> scene.Moving:
@@ -127,18 +116,6 @@ class ObstacleBuilder:
         solid = replace(self, frame=own).build(model, at)
         path = rigid_carrier(motion, self.frame, self.document, (*at, "motion"))
         return scene.Moving(solid, path, FLOATING)
-
-    def _check_extent(self, obstacle: scene.Obstacle, at: Location) -> None:
-        """Distances are exact to a stated bound only within a stated extent."""
-        limit = TOLERANCES.scene_extent
-        reach = scene.reach_of(obstacle)
-        if not reach <= limit:
-            problem = (
-                f"{obstacle.name!r} reaches {self.frame.shown(reach)} from "
-                f"{self.origin}; "
-                f"expected at most {self.frame.shown(limit)}"
-            )
-            raise self.document.invalid(at, problem)
 
     @singledispatchmethod
     def build(self, model: object, at: Location) -> solids.Solid:
@@ -186,7 +163,7 @@ class ObstacleBuilder:
     def _(self, model: schema.PrismModel, at: Location) -> solids.Solid:
         if not model.from_ < model.to:
             problem = f"is {model.to:g}, expected above from = {model.from_:g}"
-            raise self.document.invalid((*at, "to"), problem)
+            raise self.invalid((*at, "to"), problem)
         polygon = np.array(model.polygon)
         self._check_simple(without_repeats(polygon, closed=True), (*at, "polygon"))
         # Columns: the two axes of the section, then the sweep; right-handed.
@@ -195,7 +172,7 @@ class ObstacleBuilder:
         low, high = self.frame.metres(np.array([model.from_, model.to]) - base[2])
         if not low < high:
             problem = f"is {model.to!r}, too near to from = {model.from_!r}"
-            raise self.document.invalid((*at, "to"), problem)
+            raise self.invalid((*at, "to"), problem)
         return solids.Prism(
             model.name,
             np.zeros(3),
@@ -209,12 +186,12 @@ class ObstacleBuilder:
 
         hull = shapely.MultiPoint(polygon).convex_hull
         if not hull.area > 0.0:
-            raise self.document.invalid(at, "encloses no area")
+            raise self.invalid(at, "encloses no area")
         shape = shapely.Polygon(polygon)
         if not shape.is_valid:
             reason = shapely.is_valid_reason(shape)
             problem = f"crosses or touches itself ({reason}); expected a simple polygon"
-            raise self.document.invalid(at, problem)
+            raise self.invalid(at, problem)
 
     @build.register
     def _(self, model: schema.HalfSpaceModel, at: Location) -> solids.Solid:
@@ -237,7 +214,7 @@ class ObstacleBuilder:
         )
         if model.solid and not found.closed_mesh.closed:
             problem = f"is true, but {model.file!r} {found.closed_mesh.why_open}"
-            raise self.document.invalid((*at, "solid"), problem)
+            raise self.invalid((*at, "solid"), problem)
         return found
 
     @build.register
@@ -245,7 +222,7 @@ class ObstacleBuilder:
         cloud = self._read(read_cloud, model, at)
         if cloud.grid:
             problem = f"{model.file!r} is a grid of cells; expected points, or "
-            raise self.document.invalid((*at, "file"), problem + "shape: voxels")
+            raise self.invalid((*at, "file"), problem + "shape: voxels")
         size = MeshSize.of(cloud.points, model, self.frame)
         return solids.PointCloud(
             model.name,
@@ -266,7 +243,7 @@ class ObstacleBuilder:
             problem = (
                 f"has no meaning: {model.file!r} is a grid, whose cells are `size`"
             )
-            raise self.document.invalid((*at, stray[0]), problem)
+            raise self.invalid((*at, stray[0]), problem)
         points = points * edges if cloud.grid else points
         size = MeshSize.of(points, model, self.frame, self._unit_of_grid(cloud))
         return solids.Voxels(
@@ -305,7 +282,7 @@ class ObstacleBuilder:
     def _unit(self, vector: list[float], at: Location) -> FloatArray:
         unit = unit_vector(np.array(vector))
         if unit is None:
-            raise self.document.invalid(at, f"is {vector}, which has no direction")
+            raise self.invalid(at, f"is {vector}, which has no direction")
         return unit
 
 

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry import curves
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
@@ -24,11 +23,9 @@ from vdsm_pin.io.path_schema import (
 from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.tables import Table, as_text
-from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.desired_path import Approach, Blocked, DesiredPath, Order
 from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.trajectory import MAX_ROWS
-from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
 
 CURVE_TOLERANCE: Final = 0.00005
@@ -65,14 +62,8 @@ def read_points(path: Path, digest: Digest) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class PathBuilder:
+class PathBuilder(PostureBuilder):
     """Converts the tip path and refuses spacings that make no sense."""
-
-    document: YamlDocument
-    frame: Frame
-    arm: Manipulator
-    folder: Path
-    digest: Digest
 
     def build(self, model: TipPathModel) -> DesiredPath:
         """The desired path in the base frame.
@@ -81,13 +72,12 @@ class PathBuilder:
             InvalidFile: If the arm cannot stand at the start, the path leaves the
                 extent for which distances are proved, or would need too many rows.
         """
-        postures = PostureBuilder(self.document, self.frame, self.arm)
-        start = postures.start(model.start, ("tip_path", "start"))
+        start = self.start(model.start, ("tip_path", "start"))
         corners, parts = self._corners(model)
         points = self.frame.point(corners)
         insertion = self.frame.point(np.array(model.insertion).reshape(-1, 3))
-        self._check_extent(points, "points", parts)
-        self._check_extent(insertion, "insertion", np.arange(len(insertion)))
+        self._check_points(points, "points", parts)
+        self._check_points(insertion, "insertion", np.arange(len(insertion)))
         home = model.retreat == "home"
         path = DesiredPath(
             start.tip,
@@ -120,17 +110,15 @@ class PathBuilder:
         given = [asked.target, asked.direction, asked.directions]
         if sum(one is not None for one in given) != 1:
             problem = "expected one of target, direction and directions"
-            raise self.document.invalid(at, problem)
+            raise self.invalid(at, problem)
         cone = float(np.deg2rad(asked.cone_deg))
-        try:
+        with self.document.naming(at):
             if asked.target is not None:
                 return Pointing(cone, target=self.frame.point(asked.target))
             if asked.direction is not None:
                 one = self.frame.direction(np.array([asked.direction]))
                 return Pointing(cone, directions=one)
             return Pointing(cone, directions=self._directions(model, points))
-        except InvalidInput as error:
-            raise self.document.invalid(at, str(error)) from None
 
     def _directions(self, model: TipPathModel, points: FloatArray) -> FloatArray:
         """A direction for each corner, the closing one included, shape (m, 3)."""
@@ -159,12 +147,12 @@ class PathBuilder:
         for i, part in enumerate(model.points):
             before, at = made[-1][-1] if made else None, ("tip_path", "points", i)
             try:
-                made.append(self._part(part, before, tolerance))
+                with self.document.naming(at):
+                    made.append(self._part(part, before, tolerance))
             except InvalidFile as error:
-                assert isinstance(part, FilePart)
+                if not isinstance(part, FilePart):
+                    raise
                 raise self.document.invalid_file(at, part.file, error) from None
-            except InvalidInput as error:
-                raise self.document.invalid(at, str(error)) from None
         counts = [len(corners) for corners in made]
         return np.concatenate(made), np.repeat(np.arange(len(made)), counts)
 
@@ -191,16 +179,12 @@ class PathBuilder:
                 through = np.vstack([before[None], np.array(points)])
                 return curves.spline_through(through, tolerance)
 
-    def _check_extent(self, points: FloatArray, field: str, parts: IntArray) -> None:
-        reach, limit = np.linalg.norm(points, axis=1), TOLERANCES.scene_extent
-        if not (reach <= limit).all():
+    def _check_points(self, points: FloatArray, field: str, parts: IntArray) -> None:
+        reach = np.linalg.norm(points, axis=1)
+        if len(reach):
             worst = int(np.argmax(reach))
-            problem = (
-                f"lies {self.frame.shown(float(reach[worst]))} from the base, expected "
-                f"at most {self.frame.shown(limit)}"
-            )
             at = ("tip_path", field, int(parts[worst]))
-            raise self.document.invalid(at, problem)
+            self.check_extent(at, float(reach[worst]), "lies", "the base")
 
     def _check_rows(self, path: DesiredPath) -> None:
         way = np.vstack([path.start, path.insertion, path.points[:1]])
@@ -212,4 +196,4 @@ class PathBuilder:
                 f"{self.frame.shown(path.length + approach)} of path into more than "
                 f"{MAX_ROWS} rows"
             )
-            raise self.document.invalid(("tip_path", "spacing"), problem)
+            raise self.invalid(("tip_path", "spacing"), problem)

@@ -8,18 +8,17 @@ from vdsm_pin.arm.kinematics import joint_centres, link_angles
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import posture_schema as schema
-from vdsm_pin.io.frames import Frame, radians
-from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.io.frames import radians
+from vdsm_pin.io.reading import Reading
+from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.problem.planning_problem import Posture
 from vdsm_pin.tolerances import TOLERANCES
 
 
 @dataclass(frozen=True)
-class PostureBuilder:
+class PostureBuilder(Reading):
     """Converts where the arm begins and ends, and refuses where it cannot stand."""
 
-    document: YamlDocument
-    frame: Frame
     arm: Manipulator
 
     def start(
@@ -45,7 +44,7 @@ class PostureBuilder:
         if (model.tip is None) == (model.joints is None):
             count = "both" if model.joints else "neither"
             problem = f"has {count} of tip and joints, expected one of them"
-            raise self.document.invalid(at, problem)
+            raise self.invalid(at, problem)
         if model.joints is not None:
             return self._posture(model.joints, (*at, "joints"))
         tip = self.frame.point(model.tip)
@@ -60,17 +59,15 @@ class PostureBuilder:
         n, x0 = self.arm.n_links, float(self.frame.metres(model.x0))
         if not self._on_rail(x0):
             problem = f"is {self.frame.shown(x0)}, expected {self._rail()}"
-            raise self.document.invalid((*at, "x0"), problem)
+            raise self.invalid((*at, "x0"), problem)
         angles = {"alpha_deg": model.alpha_deg, "theta_deg": model.theta_deg}
         limit = np.rad2deg(self.arm.max_joint_angle)
         for name, values in angles.items():
-            if len(values) != n:
-                problem = f"has {len(values)} values, expected {n}, one per joint"
-                raise self.document.invalid((*at, name), problem)
+            self.check_count((*at, name), values, n, "values, one per joint")
             for i, value in enumerate(values):
                 if not abs(value) <= limit + np.rad2deg(TOLERANCES.joint_limit):
                     problem = f"is {value:g} deg, the joint's limit is {limit:g} deg"
-                    raise self.document.invalid((*at, name, i), problem)
+                    raise self.invalid((*at, name, i), problem)
         alpha, theta = radians([model.alpha_deg, model.theta_deg])
         psi = link_angles(alpha, theta)
         worst = int(np.argmax(psi))
@@ -79,7 +76,7 @@ class PostureBuilder:
                 f"has a link angle psi of {np.rad2deg(psi[worst]):.4g} deg at joint "
                 f"{worst + 1}, the limit is {np.rad2deg(self.arm.max_link_angle):.4g}"
             )
-            raise self.document.invalid(at, problem)
+            raise self.invalid(at, problem)
         return np.concatenate([[x0], np.column_stack([alpha, theta]).reshape(-1)])
 
     def _tip(self, joints: FloatArray) -> FloatArray:
@@ -94,7 +91,7 @@ class PostureBuilder:
                 f"lies {self.frame.shown(away)} from the rail, the arm is "
                 f"{self.frame.shown(length)} long"
             )
-            raise self.document.invalid(at, problem)
+            raise self.invalid(at, problem)
 
     def _check_straight(self, start: FloatArray, at: Location) -> None:
         """A start given by the tip alone stands for the straight arm."""
@@ -113,14 +110,14 @@ class PostureBuilder:
                     f"needs a {name} of {np.rad2deg(abs(angle)):.4g} deg of the "
                     f"straight arm, the limit is {np.rad2deg(limit):.4g} deg{advice}"
                 )
-                raise self.document.invalid(at, problem)
+                raise self.invalid(at, problem)
         x0 = float(start[0]) - along
         if not self._on_rail(x0):
             problem = (
                 f"puts the base of the straight arm at x0 = {self.frame.shown(x0)}, "
                 f"expected {self._rail()}{advice}"
             )
-            raise self.document.invalid(at, problem)
+            raise self.invalid(at, problem)
 
     def _on_rail(self, x0: float) -> bool:
         low, high = self.arm.base_range

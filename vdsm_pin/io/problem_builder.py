@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
@@ -16,7 +15,6 @@ from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import MAX_BYTES, Others
 from vdsm_pin.io.path_builder import PathBuilder, spacing_of
-from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -60,10 +58,11 @@ def build_problem(
         InvalidFile: If values that are each in range make no sense together.
     """
     frame, T_world_base = _frame(model)
-    arm = ArmBuilder(document, frame, folder, digest).build(model.manipulator)
+    known = document, frame, folder, digest
+    arm = ArmBuilder(*known).build(model.manipulator)
     self_clearance = float(frame.metres(model.required_self_clearance))
     _check_links_apart(arm, self_clearance, frame, document)
-    obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)
+    obstacles = ObstacleBuilder(*known, arm.total_length)
     scene = obstacles.build_scene(model.obstacles, arm)
     others = read_others(frame)
     for file in others.files:
@@ -72,8 +71,7 @@ def build_problem(
     scene = joined(scene, others.bodies, document)
     _check_ignored(arm, scene.names, document)
     _check_ends(model, document)
-    paths = PathBuilder(document, frame, arm, folder, digest)
-    postures = PostureBuilder(document, frame, arm)
+    paths = PathBuilder(*known, arm)
     return PlanningProblem(
         name=model.name or name,
         manipulator=arm,
@@ -84,8 +82,8 @@ def build_problem(
         required_self_clearance=self_clearance,
         tip_tolerance=_tip_tolerance(model, frame, document),
         max_row_change=_row_change(model),
-        start=postures.start(model.start, ("start",)) if model.start else None,
-        goal=postures.goal(model.goal, ("goal",)) if model.goal else None,
+        start=paths.start(model.start, ("start",)) if model.start else None,
+        goal=paths.goal(model.goal, ("goal",)) if model.goal else None,
         errors=_errors(model.errors, frame, (arm.n_links, scene), document),
         scaling=_scaling(model.ratios, arm, frame, document),
     )
@@ -99,10 +97,8 @@ def joined(
     Raises:
         InvalidFile: If two have the same name, or one is too far away.
     """
-    try:
+    with document.naming((at,)):
         return Scene((*scene.obstacles, *more)) if more else scene
-    except InvalidInput as error:
-        raise document.invalid((at,), str(error)) from None
 
 
 def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:
@@ -126,10 +122,8 @@ def _errors(
         problem = f"has {len(joint)} values, expected {n_links}: one per joint"
         raise document.invalid(("errors", "joint_deg"), problem)
     errors = build_errors(model, frame, scene, document)
-    try:
+    with document.naming(("errors",)):
         errors.angles(n_links)
-    except InvalidInput as error:
-        raise document.invalid(("errors",), str(error)) from None
     return errors
 
 
@@ -149,8 +143,8 @@ def _scaling(
     if (model.joint is None) != (model.scaling_centre is None):
         problem = "expected scaling_centre and joint together"
         raise document.invalid(("ratios",), problem)
-    try:
-        found: Scaling
+    found: Scaling
+    with document.naming(("ratios",)):
         if model.values is not None:
             found = OtherRatios(np.array(model.values))
         elif model.scaling_centre is not None and model.joint is not None:
@@ -160,8 +154,6 @@ def _scaling(
             radius = float(frame.metres(model.cylinder_radius))
             found = ProjectionCylinder(radius, model.cylinder_axis)
         found.check(arm.n_links)
-    except InvalidInput as error:
-        raise document.invalid(("ratios",), str(error)) from None
     return found
 
 
@@ -207,11 +199,8 @@ def _check_ignored(
 ) -> None:
     """Pairs that are not to be judged name what there is."""
     for i, pair in enumerate(arm.ignore_pairs):
-        try:
+        with document.naming(("manipulator", "ignore_pairs", i)):
             arm.check_ignored(pair, obstacles)
-        except InvalidInput as error:
-            at = ("manipulator", "ignore_pairs", i)
-            raise document.invalid(at, str(error)) from None
 
 
 def _check_links_apart(

@@ -8,12 +8,13 @@ end as they do there: U+0085, U+2028 and U+2029 are signs like any other.
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
 import yaml
 
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.errors import InvalidFile, InvalidInput
 
 Scalar: TypeAlias = str | int | float | bool | None
 Data: TypeAlias = "Scalar | list[Data] | dict[str, Data]"
@@ -67,6 +68,16 @@ class YamlDocument:
         """The same of a value that names a file, with what is wrong in that."""
         place = f" {error.where}:" if error.where else ""
         return self.invalid(at, f"{name!r}:{place} {error.problem}")
+
+    @contextmanager
+    def naming(self, at: Location) -> Iterator[None]:
+        """Name a value where it makes what is done within invalid."""
+        try:
+            yield
+        except InvalidFile:  # which names its place
+            raise
+        except InvalidInput as error:
+            raise self.invalid(at, str(error)) from None
 
     def line(self, location: Location) -> int | None:
         """Line of a value, or of the closest thing around it that has one."""

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -236,12 +236,8 @@ def read_cell(path: str | Path) -> Cell:
         name=file.model.name or "",
         T_world_base=frozen(pose),
     ).read_from(file.source(robot.more_files, found))
-    try:
+    with file.document.naming(("errors",)):
         return cell.under(file.errors(found.scene))
-    except InvalidFile:
-        raise
-    except InvalidInput as error:
-        raise file.document.invalid(("errors",), str(error)) from None
 
 
 def locks(words: tuple[str, ...]) -> dict[str, float]:

@@ -254,7 +254,7 @@ class CellFile:
             InvalidFile: If one breaks its contract, or is of a kind that is not judged.
         """
         folder, frame, files = self.path.parent, self.frame, list[Path]()
-        builder = ObstacleBuilder(self.document, folder, frame, robot_size, sha256())
+        builder = ObstacleBuilder(self.document, frame, folder, sha256(), robot_size)
         scene = Scene(builder.build_all(self.model.obstacles, ("obstacles",)))
         named = files_of_obstacles(self.model.obstacles, folder)
         if self.model.scene is not None:

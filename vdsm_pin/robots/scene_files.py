@@ -87,7 +87,7 @@ def _ours(
         raise first_error(error, document, SceneModel) from None
     frame = Frame(model.length_unit, np.eye(3), np.zeros(3))
     digest = hashlib.sha256()
-    builder = ObstacleBuilder(document, path.parent, frame, robot_size, digest)
+    builder = ObstacleBuilder(document, frame, path.parent, digest, robot_size)
     scene = Scene(builder.build_all(model.obstacles, ("obstacles",)))
     return scene, files_of_obstacles(model.obstacles, path.parent)
 
