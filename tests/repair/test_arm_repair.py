@@ -114,12 +114,76 @@ def test_ball_on_the_desired_path_is_refused() -> None:
         repair_arm(asked, motion)
 
 
-def test_smooth_motion_is_refused() -> None:
-    problem, motion = planned("paper/obs1")
-    times = np.arange(float(motion.n_samples))
-    smooth = replace(motion, times=times, rates=np.zeros_like(motion.joints))
-    with pytest.raises(InvalidInput, match="straight lines"):
-        repair_arm(problem, smooth)
+def least_gap(problem: PlanningProblem, joints: FloatArray) -> float:
+    """Of the last obstacle, a ball, from all links at rows, by segments; [m]."""
+    x0, alpha, theta = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
+    centres = joint_centres(problem.manipulator, x0, alpha, theta)
+    ball, way = problem.scene.obstacles[-1], np.diff(centres, axis=1)
+    assert isinstance(ball, Sphere)
+    from_start = ball.centre - centres[:, :-1]
+    share = (from_start * way).sum(axis=2) / (way * way).sum(axis=2)
+    off = from_start - np.clip(share, 0.0, 1.0)[:, :, None] * way
+    radius = problem.manipulator.link_radius + ball.radius
+    return float(np.linalg.norm(off, axis=2).min()) - radius
+
+
+@pytest.mark.parametrize(("row", "degree"), [(100, 3), (700, 3), (700, 5)])
+def test_smooth_motion_is_repaired_as_a_smooth_one(
+    row: int, degree: int, tmp_path: Path
+) -> None:
+    """On its way to the path (row 100) and while it draws (row 700)."""
+    motion, problem = planned("paper/obs2")[1], beside("paper/obs2", row, 3, -0.002)
+    steps = np.abs(np.diff(motion.joints, axis=0)).max(axis=1)
+    times = np.append(0.0, np.cumsum(5.0 * np.maximum(steps, 1e-3)))
+    rates = np.gradient(motion.joints, times, axis=0)
+    changes = np.zeros_like(rates) if degree == 5 else None
+    given = replace(motion, times=times, rates=rates, changes=changes)
+    pinned = row - 60
+    found = repair_arm(problem, given, (pinned,))
+    assert found.verification.verdict == "certified"
+    assert found.verification.coverage == pytest.approx(1.0, abs=1e-12)
+    after = found.verification.trajectory
+    assert after.path.degree == degree
+    assert after.times is not None
+    assert after.rates is not None
+    stays = np.flatnonzero(np.isin(found.given, [0, pinned, motion.n_samples - 1]))
+    for k, old in zip(stays, [0, pinned, motion.n_samples - 1], strict=True):
+        assert after.joints[k].tolist() == given.joints[old].tolist()
+        assert after.rates[k].tolist() == rates[old].tolist()
+        assert after.times[k] == times[old]
+    off = np.abs(after.joints - given.path.at(after.times)).max(axis=1)
+    np.testing.assert_allclose(found.moved, off, atol=1e-12)
+    dense = after.path.at(np.linspace(0.0, times[-1], 40_000))
+    assert least_gap(problem, given.joints) < problem.required_clearance
+    assert least_gap(problem, dense) >= problem.required_clearance - 1e-9
+    write_trajectory(tmp_path / "t.csv", after)
+    read = read_trajectory(tmp_path / "t.csv", problem.manipulator)
+    assert read.path.same_as(after.path)
+
+
+def test_few_smooth_rows_get_more_where_they_are_too_near() -> None:
+    """Two rows at rest, no path to draw, and a ball beside the middle of the way."""
+    arm = built_in("hrm8")
+    rows = np.zeros((2, 1 + 2 * arm.n_links))
+    rows[:, 0], rows[1, 1] = -4.0, 0.3
+    given = Trajectory.of_joints(
+        rows, times=np.array([0.0, 8.0]), rates=np.zeros_like(rows)
+    )
+    problem = replace(planned("paper/obs1")[0], tip_path=None, start=None, goal=None)
+    half = rows.mean(axis=0)[None]
+    middle = joint_centres(arm, half[:, 0], half[:, 1::2], half[:, 2::2])[0, 4:6].mean(
+        0
+    )
+    ball = Sphere("ball", middle + (arm.link_radius + 0.099) * np.eye(3)[2], 0.1)
+    problem = replace(problem, scene=Scene((ball,)))
+    found = repair_arm(problem, given)
+    after = found.verification.trajectory
+    assert found.verification.verdict == "certified"
+    assert found.given[[0, -1]].tolist() == [0, 1]
+    assert after.n_samples > 2
+    assert after.path.degree == 3
+    dense = after.path.at(np.linspace(0.0, 8.0, 8_000))
+    assert least_gap(problem, dense) >= problem.required_clearance - 1e-9
 
 
 def test_jacobian_agrees_with_differences() -> None:

@@ -6,18 +6,20 @@ least squares.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.repair.rounds import APART, Origins, Places, Repaired, repaired
 from vdsm_pin.repair.slopes import Slopes, joint_scale
+from vdsm_pin.repair.smooth import bulged, on_curve, sampled
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.drawing import runs, wrapped
 from vdsm_pin.verification.moving import whole_rows
@@ -35,6 +37,12 @@ WIDEST: Final = 0.5
 CHORD: Final = 0.25
 """Part of the path's spacing that a tip may leave the chord of its rows; [-]."""
 
+NEARER: Final = 4
+"""Steps along the path to where it is nearest to a tip."""
+
+TANGENT: Final = 1e-6
+"""Half of the chord that stands for the path's tangent; [m]."""
+
 
 @dataclass(frozen=True)
 class _Motion:
@@ -44,11 +52,15 @@ class _Motion:
         slopes: Of the problem's clearances.
         rows: Its rows.
         origins: Where they were.
+        given: The motion that is repaired.
+        moments: Where its rows were there, in waypoints, shape (n_rows,).
     """
 
     slopes: Slopes
     rows: Trajectory
     origins: Origins
+    given: Trajectory
+    moments: FloatArray
 
     @property
     def q(self) -> FloatArray:
@@ -59,6 +71,8 @@ class _Motion:
         """The motion sampled closely, its pairs pushed apart by margins; [m]."""
         slopes, problem = self.slopes, self.slopes.problem
         places = Places.within(_parts(problem, self.rows), moments)
+        if self.rows.is_smooth:
+            return self._bulged(places, margins)
         rows, origins = _sampled(problem, self.rows, places), self.origins.at(places)
         whole = whole_rows(problem, rows, np.arange(float(rows.n_samples)))
         tips, added = _tips(problem, rows), origins.given < 0
@@ -74,7 +88,42 @@ class _Motion:
             rows.path_m[kept],
             None if rows.times is None else rows.times[kept],
         )
-        return _Motion(slopes, moved, origins.only(kept))
+        at = places.through(self.moments)[kept]
+        return replace(self, rows=moved, origins=origins.only(kept), moments=at)
+
+    def _bulged(self, places: Places, margins: dict[int, float]) -> "_Motion":
+        """The same of smooth pieces; tips that draw are led back to the path."""
+        slopes, problem, at = self.slopes, self.slopes.problem, self.moments
+        at, width = places.through(at), self.rows.joints.shape[1]
+        origins, rows = on_curve(
+            _named(self.given),
+            at,
+            self.origins.at(places),
+            sampled(_named(self.rows), places),
+        )
+        assert rows.times is not None
+        spots = _spots(problem, self.rows, places, rows.q)
+        carried = (one.path.at(rows.times) for one in problem.scene.carriers)
+        more, tips = np.hstack([rows.q[:, :0], *carried]), _tips(problem, spots)
+
+        def room(q: FloatArray) -> FloatArray:
+            return slopes.room(np.hstack([q, more]), margins)[0]
+
+        def up(k: int, q: FloatArray) -> FloatArray:
+            whole = np.hstack([q, more[k]])[None]
+            return slopes.up(whole, tips[k : k + 1], margins)[0, :width]
+
+        names = [slopes.names[k] for k in margins]
+        origins.too_near(room(rows.q), np.array([*margins.values()]), names)
+        rows, moved = bulged(rows, lambda q: room(q).min(axis=1), up, origins.fixed)
+        rows = _led_back(slopes, rows, moved & ~origins.fixed, tips)
+        kept = origins.kept(rows.q, moved) & ((origins.given >= 0) | moved)
+        rows, origins = rows.only(kept), origins.only(kept)
+        found = Trajectory.of_joints(
+            *(rows.q, spots.on_path[kept], spots.path_m[kept]),
+            *(rows.times, rows.rates, rows.changes),
+        )
+        return replace(self, rows=found, origins=origins, moments=at[kept])
 
 
 def repair_arm(
@@ -85,29 +134,31 @@ def repair_arm(
 ) -> Repaired[ArmVerification]:
     """A certified motion near a given one.
 
-    The first row stays, the last one where it does not draw a path, and those that are
-    pinned. The tip stays on its path.
+    The first row stays, the last one where it does not draw a path or pieces are
+    smooth, and those that are pinned. The tip stays on its path; smooth pieces stay
+    smooth, and rows keep their times.
 
     Args:
         problem: Arm, scene, desired path.
-        trajectory: Straight lines between waypoints.
+        trajectory: Straight lines between waypoints, or smooth pieces.
         pinned: Numbers of waypoints, from 0, that stay.
         deadline: When to give up.
 
     Raises:
-        InvalidInput: If the motion is not of straight lines or has no such waypoint.
+        InvalidInput: If the motion has no such waypoint.
         Infeasible: If none was found; the message says why and where.
         OutOfTime: If none was found in time.
     """
-    if trajectory.is_smooth:
-        message = "repair takes straight lines between waypoints, without velocities"
-        raise InvalidInput(message)
     draws = problem.tip_path is not None and bool(trajectory.on_path[-1])
+    draws &= not trajectory.is_smooth
     ends = [0] if draws else [0, trajectory.n_samples - 1]
     origins = Origins.of(trajectory.joints, ends, pinned)
     robot, radius = load_robot(problem.manipulator), problem.manipulator.least_radius
     return repaired(
-        _Motion(Slopes(problem), trajectory, origins),
+        _Motion(
+            *(Slopes(problem), trajectory, origins, trajectory),
+            np.arange(float(trajectory.n_samples)),
+        ),
         lambda motion: verify(problem, motion.rows, robot, deadline=deadline),
         (FIRST * radius, WIDEST * radius),
         deadline,
@@ -117,13 +168,66 @@ def repair_arm(
 
 def _parts(problem: PlanningProblem, rows: Trajectory) -> IntArray:
     """Into how many parts to sample each interval, shape (n_rows - 1,)."""
-    steps = np.abs(np.diff(rows.joints, axis=0) * joint_scale(problem.manipulator))
+    steps = np.abs(np.diff(rows.path.controls, axis=1)).sum(axis=1)
+    steps *= joint_scale(problem.manipulator)
     parts = np.maximum(1.0, np.ceil(steps.max(axis=1, initial=0.0) / APART))
     if problem.tip_path is not None:
         off_chord = second_derivatives(problem.manipulator, rows) / 8.0
         fine = np.ceil(np.sqrt(off_chord / (CHORD * problem.path.spacing)))
         parts = np.where(rows.on_path[:-1], np.maximum(parts, fine), parts)
     return np.asarray(parts, np.int64)
+
+
+def _named(rows: Trajectory) -> JointTrajectory:
+    """Joint values and what joins them, by any names."""
+    names = tuple(map(str, range(rows.joints.shape[1])))
+    return JointTrajectory(names, rows.joints, rows.times, rows.rates, rows.changes)
+
+
+def _spots(
+    problem: PlanningProblem, rows: Trajectory, places: Places, q: FloatArray
+) -> Trajectory:
+    """Samples of a smooth motion, drawing where the tip is nearest to the path.
+
+    Args:
+        problem: Arm and desired path.
+        rows: The motion.
+        places: Of the samples.
+        q: Their joint values, shape (m, 1 + 2N).
+    """
+    even = _sampled(problem, rows, places)
+    if problem.tip_path is None or not (between := even.on_path & ~places.old).any():
+        return Trajectory.of_joints(q, even.on_path, even.path_m, even.times)
+    path, path_m = problem.path, even.path_m.copy()
+    tips = joint_centres(problem.manipulator, q[:, 0], q[:, 1::2], q[:, 2::2])[:, -1]
+    k, run = places.row[between], runs(path, rows.path_m)[places.row[between]]
+    begin, s = wrapped(path, rows.path_m)[k], path_m[between]
+    low, high = np.minimum(begin, begin + run), np.maximum(begin, begin + run)
+    for _ in range(NEARER):
+        ends = [path.at(wrapped(path, s + side)) for side in (-TANGENT, TANGENT)]
+        along = (ends[1] - ends[0]) / (2.0 * TANGENT)
+        s = s + ((tips[between] - 0.5 * (ends[0] + ends[1])) * along).sum(axis=1)
+        s = np.clip(s, low, high)
+    path_m[between] = s
+    return Trajectory.of_joints(q, even.on_path, path_m, even.times)
+
+
+def _led_back(
+    slopes: Slopes, rows: JointTrajectory, moved: BoolArray, tips: FloatArray
+) -> JointTrajectory:
+    """Moved rows with their tips where they have to be; rates follow."""
+    drawing = moved & np.isfinite(tips[:, 0])
+    if rows.times is None or rows.rates is None or not drawing.any():
+        return rows
+    back = np.zeros_like(rows.q)
+    back[drawing] = slopes.led_back(rows.q[drawing], tips[drawing]) - rows.q[drawing]
+    faster = np.where(moved[:, None], np.gradient(back, rows.times, axis=0), 0.0)
+    changes = rows.changes
+    if changes is not None:
+        bent = np.gradient(faster, rows.times, axis=0)
+        changes = changes + np.where(moved[:, None], bent, 0.0)
+    q, rates = rows.q + back, rows.rates + faster
+    return replace(rows, q=q, rates=rates, changes=changes)
 
 
 def _sampled(problem: PlanningProblem, rows: Trajectory, places: Places) -> Trajectory:

@@ -6,12 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.geometry.bernstein import derivative, value
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.bodies import Pair
 from vdsm_pin.repair.rounds import APART, Origins, Places, Repaired, repaired
+from vdsm_pin.repair.smooth import bulged, on_curve, sampled
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -23,17 +23,8 @@ MARGINS: Final = 1e-3, 8e-3
 PUSHES: Final = 25
 """Most steps of one sample up the slopes."""
 
-BULGES: Final = 100
-"""Most bulges of a smooth motion in one round."""
-
-SLOW: Final = 10.0
-"""Half the least length of a bulge, over its shift at the motion's own speed; [-]."""
-
 LONGEST: Final = 0.1
 """Longest such step; [rad], [m]."""
-
-ROUNDED: Final = 1e-12
-"""How far a sample of a smooth piece may be off where it was; [rad], [m]."""
 
 STEP: Final = 1e-6
 """Of the differences that slopes are taken from; [rad], [m]."""
@@ -68,11 +59,9 @@ class _Motion:
         parts = np.ceil(steps.max(axis=1, initial=0.0) / APART)
         places = Places.within(np.maximum(1.0, parts).astype(np.int64), moments)
         origins, at = self.origins.at(places), places.through(self.moments)
-        rows = _sampled(self.rows, places)
+        rows = sampled(self.rows, places)
         if rows.rates is not None:
-            base = self.given.path.at_moments(at)
-            q = np.where(np.abs(rows.q - base) <= ROUNDED, base, rows.q)
-            origins, rows = replace(origins, base=base), replace(rows, q=q)
+            origins, rows = on_curve(self.given, at, origins, rows)
         others = self._others(rows.times, len(rows.q))
         pairs = [self.cell.pairs[k] for k in margins]
         more = np.array([*margins.values()])
@@ -80,7 +69,12 @@ class _Motion:
         names = [self.cell.names(pair) for pair in pairs]
         bad = origins.too_near(slopes.gaps(rows.q, others), more, names)
         if rows.times is not None and rows.rates is not None:
-            rows, bad = _bulged(rows, slopes, others, origins.fixed)
+            rows, bad = bulged(
+                rows,
+                lambda q: slopes.gaps(q, others).min(axis=1),
+                lambda k, q: slopes.up(q, others[k : k + 1]),
+                origins.fixed,
+            )
             kept = origins.kept(rows.q, bad)
         else:
             kept, q = origins.kept(rows.q, bad), rows.q.copy()
@@ -98,80 +92,6 @@ class _Motion:
         return np.hstack(
             [none, *(one.path.at(times) for one in self.cell.scene.carriers)]
         )
-
-
-def _sampled(motion: JointTrajectory, places: Places) -> JointTrajectory:
-    """The same motion with waypoints at some places, exact where they are rows."""
-    times = None if motion.times is None else places.through(motion.times)
-    if motion.times is None or motion.rates is None:
-        return replace(motion, q=places.through(motion.q), times=times)
-    row, old = places.row, places.old[:, None]
-    k = np.minimum(row, motion.path.n_intervals - 1)
-    share, step = places.moments - k, np.diff(motion.times)[k, None]
-    controls = motion.path.pieces(k)
-    q = np.where(old, motion.q[row], value(controls, share))
-    rates = value(derivative(controls), share) / step
-    rates = np.where(old, motion.rates[row], rates)
-    changes = motion.changes
-    if changes is not None:
-        between = value(derivative(derivative(controls)), share) / step**2
-        changes = np.where(old, changes[row], between)
-    return replace(motion, q=q, times=times, rates=rates, changes=changes)
-
-
-def _bulged(
-    motion: JointTrajectory, slopes: "_Slopes", others: FloatArray, fixed: BoolArray
-) -> tuple[JointTrajectory, BoolArray]:
-    """A smooth motion that bulges out where it is too near, and which rows it moved.
-
-    A bulge is (1 - u^2)^3 of a shift, with u = -1 and 1 at its ends, see `_ends`.
-    """
-    times, rates = motion.times, motion.rates
-    assert times is not None
-    assert rates is not None
-    q, changes = motion.q, motion.changes
-    moved, fast = np.zeros(len(q), np.bool_), float(np.abs(rates).max()) or np.inf
-    for _ in range(BULGES):
-        gaps = slopes.gaps(q, others).min(axis=1)
-        gaps[fixed] = np.inf
-        k = int(np.argmin(gaps))
-        if not -np.inf < gaps[k] < 0.0:
-            break
-        shift = slopes.up(q[k], others[k : k + 1]) - q[k]
-        slow = SLOW * float(np.abs(shift).max()) / fast
-        low, high = _ends(times, k, (gaps >= 0.0, fixed), slow)
-        width = np.where(times < times[k], times[k] - low, high - times[k])
-        u = np.clip((times - times[k]) / width, -1.0, 1.0)
-        rest, moved = 1.0 - u**2, moved | (np.abs(u) < 1.0)
-        q = q + (rest**3)[:, None] * shift
-        rates = rates + (-6.0 * u * rest**2 / width)[:, None] * shift
-        if changes is not None:
-            bend = rest * (24.0 * u**2 - 6.0 * rest) / width**2
-            changes = changes + bend[:, None] * shift
-    return replace(motion, q=q, rates=rates, changes=changes), moved
-
-
-def _ends(
-    times: FloatArray, k: int, rows: tuple[BoolArray, BoolArray], slow: float
-) -> tuple[float, float]:
-    """When a bulge about row k begins and ends; [s].
-
-    It is twice as long as what is too near there, and at least `slow` to either side,
-    unless a fixed row is in its way.
-
-    Args:
-        times: Of the rows, shape (n_rows,); [s].
-        k: The row.
-        rows: Which are clear or fixed, and which are fixed, shape (n_rows,) each.
-        slow: Least half of its length; [s].
-    """
-    clear, fixed = (times[which] for which in rows)
-    at = times[k]
-    before, after = clear[clear < at].max(), clear[clear > at].min()
-    begin, end = fixed[fixed < at].max(), fixed[fixed > at].min()
-    low = min(2.0 * before - at, at - slow)
-    high = max(2.0 * after - at, at + slow)
-    return float(max(low, begin)), float(min(high, end))
 
 
 def repair_robot(
