@@ -18,19 +18,19 @@ CONTRACT = """\
     radius spacing tip_tolerance
 <= 1e12, > 0.0, items <= 40, items >= 2: link_radius
 <= 1e12, >= -1e12: alpha_deg[] axis[] base_range[] center[] direction[] directions[][]
-    from hole_angles_deg[][] insertion[][] normal[] point[] points[][] polygon[][]
+    from hole_angles_deg[][] insertion[][] lock normal[] point[] points[][] polygon[][]
     position[] positions[][] rpy_deg[][] scaling_centre[] spline[][] start[] target[]
     theta_deg[] through[] times_s[] tip[] to[] values[] x0
 <= 1e12, >= -1e12, items <= 3, items >= 3: rpy_deg[] to
 <= 1e12, >= 0.0: joint_deg[] required_clearance
 <= 1e12, >= 0.0, default 0.0: base base_deg joint_deg obstacle required_self_clearance
     retreat shift slide
-<= 256, >= 1, default 1: parts
+<= 256, >= 1, default 1, default None: parts
 <= 40, >= 1: link
 >= 2, default None: joint
 default False: closed
-default None: cables feed goal joints length_unit motion pointing positions ratios
-    solid tip_path tool
+default None: bodies cables feed goal group joint_limits joints length_unit manipulator
+    motion pointing positions ratios robot solid srdf tip_path tool topic
 default None, default [0.0, 0.0, 0.0], items <= 3, items >= 3: rpy_deg
 default None, default custom, length <= 100: name
 default None, items <= 2, items >= 2: base_range scaling_centre
@@ -39,7 +39,7 @@ default None, items <= 40: hole_angles_deg values
 default None, items >= 1: directions
 default True: check_size
 default [0.0, 0.0, 0.0], items <= 3, items >= 3: center position
-default []: bodies ignore_pairs insertion obstacles others
+default []: bodies ignore_pairs insertion obstacles others package_dirs
 default as_given: order
 default detour: blocked
 default shortest: approach
