@@ -18,7 +18,7 @@ from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.pair_sweep import Stretch
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.proving import dense_rows, new_results
-from vdsm_pin.proof.terms import CERTIFIED, OBSTACLES, UNDECIDED, Rules, Task
+from vdsm_pin.proof.terms import ACROSS, CERTIFIED, UNDECIDED, Rules, Task
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.proof.workspace import new_workspace
 
@@ -101,7 +101,7 @@ def test_far_pairs_are_told_as_by_loops(seed: int, nominal: bool) -> None:
     dense.verdict[:] = UNDECIDED
     results = results._replace(dense=dense)
     assert results.stride == 3
-    results.limit[OBSTACLES] = rng.choice([np.inf, 0.3]) if nominal else 0.3
+    results.limit[ACROSS] = rng.choice([np.inf, 0.3]) if nominal else 0.3
     centres = np.array([body.pieces[0].points[0] for body in case.bodies[:n]])
     radii = np.array([body.pieces[0].radius for body in case.bodies[:n]])
     np.testing.assert_allclose(broad.box[0], (centres - radii[:, None]).T, **CLOSE)
@@ -117,7 +117,7 @@ def test_far_pairs_are_told_as_by_loops(seed: int, nominal: bool) -> None:
             number[movers.index(row.one), row.other] = pair
     for start, count in BLOCKS:
         fill_rows(task, case.path.packed(), work.rows, start, count)
-        limit, near = results.limit[OBSTACLES], [1]
+        limit, near = results.limit[ACROSS], [1]
         stretch = Stretch(start, start, count, False, False, False)
         n_near = settle_far(task, work, results, broad, stretch)
         bounds = np.full((2, 2, n), np.inf)
@@ -163,7 +163,7 @@ def test_far_pairs_are_told_as_by_loops(seed: int, nominal: bool) -> None:
                     assert dense.verdict[k, pair] == CERTIFIED
             untold = number[b][asked & ~far]
             assert (dense.verdict[start : start + count, untold] == UNDECIDED).all()
-        np.testing.assert_allclose(results.limit[OBSTACLES], limit, **CLOSE)
+        np.testing.assert_allclose(results.limit[ACROSS], limit, **CLOSE)
         np.testing.assert_allclose(broad.gap[:2], bounds[0], **CLOSE)
         np.testing.assert_allclose(broad.reach[:2], bounds[1], **CLOSE)
         assert sorted(broad.near[:n_near].tolist()) == sorted(near)

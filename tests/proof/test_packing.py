@@ -13,7 +13,7 @@ from vdsm_pin.proof.moving_sides import FEW
 from vdsm_pin.proof.packed_tree import FIXED, PRISMATIC, REVOLUTE, pack_tree
 from vdsm_pin.proof.packing import for_motion, pack_task, with_errors
 from vdsm_pin.proof.parts import planned_parts
-from vdsm_pin.proof.terms import LINKS, OBSTACLES, WORLD, Rules
+from vdsm_pin.proof.terms import ACROSS, WITHIN, WORLD, Rules
 from vdsm_pin.proof.tree import Kind, Tree
 
 RULES = Rules(True, True, 1e-11, 1e-9, 1e-6, 0.02, np.inf)
@@ -138,7 +138,7 @@ def test_pairs_of_one_branch_are_of_links_and_shifts_cost_both_sides(seed: int) 
         for row, pair in enumerate(pairs):
             one, other = bodies[pair.one].frame, bodies[pair.other].frame
             apart = tree.branches[one] != tree.branches[other]
-            assert task.pairs.group[row] == (OBSTACLES if apart else LINKS)
+            assert task.pairs.group[row] == (ACROSS if apart else WITHIN)
             assert task.pairs.column[row] == (pair.other if apart else -1)
             way = np.concatenate(tree.way(other, one))
             shift = box.shifts[way].sum() + box.surfaces[[pair.one, pair.other]].sum()

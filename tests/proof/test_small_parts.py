@@ -55,11 +55,11 @@ from vdsm_pin.proof.proving import new_results, room_for
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import new_tracks
 from vdsm_pin.proof.terms import (
+    ACROSS,
     CERTIFIED,
-    LINKS,
-    OBSTACLES,
     REFUTED,
     UNDECIDED,
+    WITHIN,
     Rules,
     Task,
     mover_of,
@@ -414,7 +414,7 @@ def pair_task(groups: tuple[int, ...]) -> Task:
     tree = Tree(free_joints(2))
     bodies = [Body(2, (Hull(np.zeros((1, 3)), 0.1),))]
     bodies += [
-        Body(0 if group == OBSTACLES else 1, (Hull(np.full((1, 3), 2.0)),))
+        Body(0 if group == ACROSS else 1, (Hull(np.full((1, 3), 2.0)),))
         for group in groups
     ]
     table = PairTable.of([Pair(0, 1 + k) for k in range(len(groups))])
@@ -465,7 +465,7 @@ def test_the_least_upper_bound_is_kept_with_the_nearer_row() -> None:
 @pytest.mark.parametrize("room", [1, 3, 8, 64])
 def test_blocks_are_noted_as_by_a_list_of_them(room: int, profile: int) -> None:
     """Best rows, the profile and candidates, where some find no room."""
-    rng, groups = np.random.default_rng([10, room]), (OBSTACLES, LINKS, OBSTACLES)
+    rng, groups = np.random.default_rng([10, room]), (ACROSS, WITHIN, ACROSS)
     task, n_intervals = pair_task(groups), 40
     for _ in range(12):
         found = new_results(3, 4, n_intervals, Budget(profile=profile, candidates=room))
@@ -482,7 +482,7 @@ def test_blocks_are_noted_as_by_a_list_of_them(room: int, profile: int) -> None:
             held = int(found.tally[HELD])
             before, over = candidates(found), found.overflow.copy()
             note_block(task, found, pair, first, lower, upper)
-            for column in (0, 1 + pair) if groups[pair] == OBSTACLES else ():
+            for column in (0, 1 + pair) if groups[pair] == ACROSS else ():
                 for r in range(size):
                     at = (first + r) // stride
                     bins[:, column, at] = np.minimum(
@@ -522,7 +522,7 @@ def test_room_is_for_as_many_as_are_asked() -> None:
     assert {part.shape for part in room_for(5)} == {(5,)}
     assert new_results(2, 1, 3, Budget()).candidates.lower.size == 6
     assert new_results(2, 1, 3, Budget(candidates=4)).candidates.lower.size == 4
-    task = pair_task((OBSTACLES,))
+    task = pair_task((ACROSS,))
     found = new_results(1, 2, 3, Budget(candidates=0))
     nominate(task, found, 0, 0, np.array([0.5, 0.25]))
     assert found.overflow.tolist() == [0.25, np.inf]
@@ -530,7 +530,7 @@ def test_room_is_for_as_many_as_are_asked() -> None:
 
 def test_a_held_clearance_falls_as_the_body_moves() -> None:
     rng = np.random.default_rng(12)
-    task = pair_task((OBSTACLES,))
+    task = pair_task((ACROSS,))
     for corners in (1, 2, 4):
         tracks, body = new_tracks(corners + 2, 64), loaded_body(2 * corners, corners, 1)
         tracks.places[:] = rng.normal(size=tracks.places.shape)
@@ -589,7 +589,7 @@ def test_of_many_pieces_the_bound_is_the_least_but_for_half_of_the_slack(
 
 
 def test_versions_go_from_the_roughest_to_the_pair_itself() -> None:
-    task = pair_task((OBSTACLES,) * 3)
+    task = pair_task((ACROSS,) * 3)
     assert task.pairs.rough.shape == (3, 0)
     assert not task.pairs.loose.any()
     rough = np.array([[3, 4, 5], [-1, 6, 7], [-1, -1, -1]])

@@ -25,7 +25,7 @@ from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.clearance_check import OBSTACLES
-from vdsm_pin.verification.inside import LINKS
+from vdsm_pin.verification.inside import LINKS_OUTSIDE
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="one"><link name="base"/>
@@ -83,7 +83,7 @@ def test_verdicts_are_those_of_solid_angles(seed: int, tmp_path: Path) -> None:
     mesh.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
     mesh.apply_translation(np.array([0.5, 0.0, 0.0]) + rng.uniform(-0.4, 0.4, 3))
     result = judged(cell_in(tmp_path, mesh), tmp_path)
-    (row,) = (check for check in result.checks if check.name == LINKS)
+    (row,) = (check for check in result.checks if check.name == LINKS_OUTSIDE)
     inside = abs(winding(mesh, np.array([0.5, 0.0, 0.0]))) > 0.5
     assert row.verdict is (Verdict.REFUTED if inside else Verdict.CERTIFIED)
     if inside:
@@ -112,7 +112,7 @@ def test_an_inside_that_cannot_be_told_is_undecided_or_far(tmp_path: Path) -> No
     bowl.apply_translation([0.5, 0.0, 0.0])
     result = judged(cell_in(tmp_path, bowl), tmp_path)
     assert result.verdict is Verdict.UNDECIDED
-    row = next(check for check in result.checks if check.name == LINKS)
+    row = next(check for check in result.checks if check.name == LINKS_OUTSIDE)
     assert row.where.startswith(
         "whether link 'arm' is inside 'shell' cannot be decided"
     )

@@ -24,7 +24,7 @@ from vdsm_pin.proof.plane_bounds import place_disc
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import seen
 from vdsm_pin.proof.terms import (
-    OBSTACLES,
+    ACROSS,
     Task,
     finer,
 )
@@ -78,7 +78,7 @@ def _settle_body(
         n_near: Near pairs so far.
     """
     apart()
-    threshold = max(upper, results.limit[OBSTACLES])
+    threshold = max(upper, results.limit[ACROSS])
     gap, far, number = broad.gap[body], broad.far[body], broad.number[body]
     for o in range(gap.size):
         required = task.pairs.required[max(number[o], 0)]
@@ -133,7 +133,7 @@ def settle_far(
             gap[o] -= lost[pair] if pair >= 0 else 0.0
         upper = _nearest_upper(task, work, broad, body)
         if rules.nominal:
-            results.limit[OBSTACLES] = min(results.limit[OBSTACLES], upper)
+            results.limit[ACROSS] = min(results.limit[ACROSS], upper)
         n_near = _settle_body(task, results, broad, body, upper, n_near)
         far, settled = broad.far[body], broad.settled[body]
         rise_of = rules.pad - radius

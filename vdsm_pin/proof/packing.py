@@ -10,7 +10,7 @@ from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.moving_sides import moving_sides
 from vdsm_pin.proof.packed_tree import pack_tree, strokes
-from vdsm_pin.proof.terms import LINKS, OBSTACLES, Pairs, Rules, Task
+from vdsm_pin.proof.terms import ACROSS, WITHIN, Pairs, Rules, Task
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.proof.ways import WayErrors, way_errors
 
@@ -67,7 +67,7 @@ def pack_task(
         way=moving.way[of_pair],
         slot=moving.slot[of_pair],
         slots=moving.slots,
-        group=np.where(apart, OBSTACLES, LINKS),
+        group=np.where(apart, ACROSS, WITHIN),
         column=np.where(apart, columns[pairs.other], -1).astype(np.int64),
         required=pairs.required.astype(np.float64),
         loose=np.zeros(n) if pairs.loose is None else pairs.loose,

@@ -26,7 +26,7 @@ from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.results import Candidates, Dense, Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import Witnesses
-from vdsm_pin.proof.terms import LINKS, OBSTACLES, UNDECIDED, Task
+from vdsm_pin.proof.terms import ACROSS, UNDECIDED, WITHIN, Task
 from vdsm_pin.proof.witnesses import place_best
 from vdsm_pin.proof.workspace import Workspace, new_workspace
 
@@ -125,7 +125,7 @@ class Proving:
         in_time = self.judge(0, self.n_intervals)
         if in_time:
             heap = np.zeros((self.budget.candidates + self.budget.slices, SLICE))
-            for group in (OBSTACLES, LINKS):
+            for group in (ACROSS, WITHIN):
                 self._narrow(group, heap)
         self.place_witnesses()
         return in_time
@@ -181,7 +181,7 @@ class Proving:
         np.minimum.at(proved, heap[:count, PAIR].astype(np.int64), heap[:count, KEY])
         proved = np.minimum(proved, results.overflow[group])[mine]
         results.best[mine, LOW] = np.maximum(results.best[mine, LOW], proved)
-        if group == OBSTACLES:
+        if group == ACROSS:
             # Every interval keeps what the narrowing proved of all of them.
             lower = results.profile[0]
             np.maximum(lower, proved.min(), out=lower)

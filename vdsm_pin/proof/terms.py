@@ -22,9 +22,10 @@ REFUTED: Final = 1
 UNDECIDED: Final = 2
 """Verdicts as the chunks number them."""
 
-OBSTACLES: Final = 0
-LINKS: Final = 1
-"""Groups of pairs, each with a least clearance of its own."""
+ACROSS: Final = 0
+WITHIN: Final = 1
+"""Groups of pairs, each with a least clearance of its own: of bodies on different
+branches, one of which may be the world, and of bodies on one."""
 
 
 class Bodies(NamedTuple):
@@ -92,7 +93,7 @@ class Pairs(NamedTuple):
         way: From the partner's frame to the body's, shape (n_rows,).
         slot: Where the numbers of its corners' places start, shape (n_rows,).
         slots: Numbers of places, for each pair one a corner of its body.
-        group: OBSTACLES or LINKS, shape (n_rows,).
+        group: ACROSS or WITHIN, shape (n_rows,).
         column: Where the profile has the partner's bounds, -1 for nowhere, (n_rows,).
         required: Least clearance, shape (n_rows,); [m].
         loose: What a rough version misses of both bodies, shape (n_rows,); [m].

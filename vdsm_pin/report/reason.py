@@ -10,7 +10,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.rows import LeftOutRow
 from vdsm_pin.report.words import at_least, depth, finite, percent, place, quantity
-from vdsm_pin.verification.inside import ARM, LINKS, surfaces
+from vdsm_pin.verification.inside import ARM_OUTSIDE, LINKS_OUTSIDE, surfaces
 from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
@@ -47,7 +47,7 @@ def reason(verification: Verification) -> str:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
     found = f"{first.name} is {depth(first.worst, first.deeper, first.unit)}"
-    inside = first.name in (ARM, LINKS)
+    inside = first.name in (ARM_OUTSIDE, LINKS_OUTSIDE)
     if inside:
         found = first.where
     elif math.isnan(first.worst):

@@ -13,8 +13,8 @@ from vdsm_pin.robots.errors import joint_errors
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.counterexample import (
+    ErringPair,
     Moment,
-    Question,
     counterexamples,
     grown_by,
     moments_of,
@@ -55,13 +55,13 @@ def robot_counterexamples(
         pairs,
         least.verdict,
         least.lower,
-        lambda k: _question(cell, path, k, pairs[k]),
+        lambda k: _erring_pair(cell, path, k, pairs[k]),
         moments,
         deadline,
     )
 
 
-def _question(cell: Cell, path: Path, k: int, named: Pair) -> Question:
+def _erring_pair(cell: Cell, path: Path, k: int, named: Pair) -> ErringPair:
     """Of a pair of the cell, the link first."""
     pair, tree = cell.pairs[k], cell.tree
     one, other = cell.bodies[pair.one], cell.bodies[pair.other]
@@ -71,7 +71,7 @@ def _question(cell: Cell, path: Path, k: int, named: Pair) -> Question:
 
     n, sizes = len(cell.robot.joints), np.zeros(tree.n_columns)
     sizes[:n] = joint_errors(cell.robot.joints, cell.errors)
-    return Question(
+    return ErringPair(
         pair=named,
         tree=tree,
         bodies=(other, one) if named.obstacle else (one, other),

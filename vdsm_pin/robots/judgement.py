@@ -35,12 +35,11 @@ from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
-from vdsm_pin.verification.coal_check import Evidence as CoalEvidence
+from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_shapes import disagreement
 from vdsm_pin.verification.enclosed import enclosed_least
 from vdsm_pin.verification.first_contact import FirstContact
-from vdsm_pin.verification.inside import LINKS as INSIDE
-from vdsm_pin.verification.inside import check_inside
+from vdsm_pin.verification.inside import LINKS_OUTSIDE, check_inside
 from vdsm_pin.verification.moving import Knots, in_short_parts, joined_path
 from vdsm_pin.verification.records import Check, Verdict, Verification
 
@@ -110,7 +109,7 @@ def verify_robot(
         pose_check(robot, path),
         *limit_checks(robot, path),
         *cell.scene.checks_of_carriers(),
-        *check_inside(by_mesh(cell, located), INSIDE),
+        *check_inside(by_mesh(cell, located), LINKS_OUTSIDE),
         *clearance_checks(cell, evidence, None if proof.in_time else deadline),
         *([coal] if cell.pairs else [_no_pair(cell)]),
     ]

@@ -15,8 +15,8 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.counterexample import (
+    ErringPair,
     Moment,
-    Question,
     counterexamples,
     grown_by,
     moments_of,
@@ -26,9 +26,9 @@ from vdsm_pin.verification.records import Counterexample, Pair
 from vdsm_pin.verification.task import ball_of
 
 
-def arm_question(
+def erring_pair(
     problem: PlanningProblem, trajectory: Trajectory, pair: Pair, errors: ErrorBox
-) -> Question:
+) -> ErringPair:
     """What is asked of a pair of an arm."""
     mine = np.array([name == pair.obstacle for name in problem.scene.names], bool)
     problem, arm = problem.among(mine), problem.manipulator
@@ -44,7 +44,7 @@ def arm_question(
         bodies[pair.label] = Body(frame, problem.scene.obstacles[0].pieces, pair.label)
     sizes, angles = np.zeros(tree.n_columns), errors.angles(arm.n_links)
     sizes[1 : 1 + angles.size] = angles.reshape(-1)
-    return Question(
+    return ErringPair(
         pair=pair,
         tree=tree,
         bodies=(bodies[pair.own], bodies[pair.label]),
@@ -92,7 +92,7 @@ def find_counterexamples(
         proof.pairs,
         np.select([lost, left], [REFUTED, UNDECIDED], CERTIFIED),
         proof.best[:, LOW],
-        lambda k: arm_question(problem, trajectory, proof.pairs[k], errors),
+        lambda k: erring_pair(problem, trajectory, proof.pairs[k], errors),
         lambda k: of_best(proof.best[k]),
         deadline,
     )

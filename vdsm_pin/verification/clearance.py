@@ -32,8 +32,8 @@ from vdsm_pin.proof.prover import RANK, verdicts_of
 from vdsm_pin.proof.proving import dense_rows, room_for
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import (
-    LINKS,
-    OBSTACLES,
+    ACROSS,
+    WITHIN,
 )
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.brackets import (
@@ -104,7 +104,7 @@ def _chunk(
     dense, count = proving.results.dense, int(knots.first[last] - knots.first[first])
     own, other = dense.own[:count], dense.other[:count]
     # In a pair of links the sweep moves the second one against the first.
-    swapped = (proving.task.pairs.group == LINKS)[None, :, None]
+    swapped = (proving.task.pairs.group == WITHIN)[None, :, None]
     chunk = ClearanceChunk(
         first_interval=first,
         # No interval is worse than what narrowing proved of all of them.
@@ -225,7 +225,7 @@ def _send(
     """
     proving = proof.proving
     known, obstacles = proving.results, problem.scene.obstacles
-    outer, obstacle = proving.task.pairs.group == OBSTACLES, proving.task.pairs.obstacle
+    outer, obstacle = proving.task.pairs.group == ACROSS, proving.task.pairs.obstacle
     # numpy.unique imports numpy.ma, for which every process would wait.
     near = np.flatnonzero(np.bincount(obstacle[outer & (known.best[:, LOW] <= reach)]))
     pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)

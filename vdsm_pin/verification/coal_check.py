@@ -29,7 +29,7 @@ COAL: Final = "distances by Coal against the proved brackets"
 
 
 @dataclass
-class Evidence:
+class CoalEvidence:
     """Counts answers of Coal and remembers the one that disagrees the most.
 
     Args:
@@ -149,7 +149,11 @@ def check_coal(
         OutOfTime: If the time is over.
         VerificationFailed: If Coal refuses a shape.
     """
-    arm, evidence, log = CoalArm(robot, problem, deadline), Evidence(), log or CoalLog()
+    arm, evidence, log = (
+        CoalArm(robot, problem, deadline),
+        CoalEvidence(),
+        log or CoalLog(),
+    )
     if not arm.pairs.one.size:
         return ()
     rows = chain(

@@ -65,7 +65,7 @@ is found, and its centre; [m]."""
 
 
 @dataclass(frozen=True)
-class Question:
+class ErringPair:
     """Whether two bodies of a tree come too near within an error box.
 
     Args:
@@ -109,7 +109,7 @@ class Search:
         asked: The pair and the errors.
     """
 
-    def __init__(self, asked: Question) -> None:
+    def __init__(self, asked: ErringPair) -> None:
         self.asked, self.limit = asked, asked.required + asked.grown
         path = Path(asked.rows(np.zeros(1)))
         table = PairTable.of([ProofPair(0, 1, self.limit)])
@@ -238,7 +238,7 @@ def counterexamples(
     pairs: Sequence[Pair],
     verdict: IntArray,
     lower: FloatArray,
-    question: Callable[[int], Question],
+    question: Callable[[int], ErringPair],
     moments: Callable[[int], tuple[Moment, ...]],
     deadline: Deadline,
 ) -> tuple[Counterexample, ...]:

@@ -31,8 +31,8 @@ from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.records import Check, Verdict, combine
 
-ARM: Final = "arm outside the meshes"
-LINKS: Final = "links outside the meshes"
+ARM_OUTSIDE: Final = "arm outside the meshes"
+LINKS_OUTSIDE: Final = "links outside the meshes"
 """Names of the row of evidence: of a snake arm, and of any other robot."""
 
 Enclosed: TypeAlias = Mapping[str, Mapping[str, FloatArray]]
@@ -221,7 +221,9 @@ def arm_inside(located: Mapping[str, Location]) -> tuple[str, ...]:
     return tuple(name for name, where in found if where.side is Side.INSIDE)
 
 
-def check_inside(located: Mapping[str, Location], name: str = ARM) -> tuple[Check, ...]:
+def check_inside(
+    located: Mapping[str, Location], name: str = ARM_OUTSIDE
+) -> tuple[Check, ...]:
     """The row of evidence that no body held apart from a mesh is inside it.
 
     Args:

@@ -22,7 +22,7 @@ from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.terms import UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.arm_counterexamples import arm_question, of_best
+from vdsm_pin.verification.arm_counterexamples import erring_pair, of_best
 from vdsm_pin.verification.counterexample import Search
 from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.task import ArmPairs, obstacle_growth
@@ -285,6 +285,6 @@ def _smallest(
     pairs, searches = ArmPairs(problem), []
     for k in nearest.tolist():
         deadline.check()
-        search = Search(arm_question(problem, trajectory, pairs.pair(k), errors))
+        search = Search(erring_pair(problem, trajectory, pairs.pair(k), errors))
         searches.append(search.smallest(of_best(best[k])))
     return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]
