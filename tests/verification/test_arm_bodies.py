@@ -225,7 +225,7 @@ def distances(
             continue
         partner = others.get(pair.label)
         if partner is None:
-            from vdsm_pin.verification.coal_bodies import CoalBody
+            from vdsm_pin.verification.coal_hulls import CoalBody
 
             partner = (CoalBody(*placed[pair.label]),)
         gap = measure(request, *placed[pair.own], partner).distance

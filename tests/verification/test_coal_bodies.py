@@ -13,7 +13,7 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.geometry.solids import Cylinder, Mesh, Prism, Sphere
+from vdsm_pin.geometry.solids import Cylinder, Mesh, PointCloud, Prism, Sphere
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -23,12 +23,12 @@ from vdsm_pin.verification import coal_bodies as coal_side
 from vdsm_pin.verification.coal_arm import CoalArm
 from vdsm_pin.verification.coal_bodies import (
     LARGEST,
-    CoalBody,
     coal_bodies,
     distance_request,
     measure,
 )
 from vdsm_pin.verification.coal_check import check_coal
+from vdsm_pin.verification.coal_hulls import CoalBody, swept_polygon
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -147,6 +147,30 @@ def test_an_answer_does_not_depend_on_the_one_before() -> None:
         first = measure(request, capsule, far, bodies).distance
         assert measure(request, capsule, near, bodies).distance < first
         assert measure(request, capsule, far, bodies).distance == first
+
+
+def test_the_nearest_ball_of_a_cloud_is_found_where_a_manager_of_coal_errs() -> None:
+    rng, request, wrong = np.random.default_rng(5), distance_request(), 0
+    points = rng.uniform(-1.0, 1.0, (300, 3))
+    cloud = coal_bodies(PointCloud("c", points, 0.01))
+    manager, ball = coal.DynamicAABBTreeCollisionManager(), coal.Sphere(0.01)
+    objects = [
+        coal.CollisionObject(ball, coal.Transform3s(np.eye(3), point))
+        for point in points
+    ]
+    for one in objects:
+        manager.registerObject(one)
+    manager.setup()
+    for centre in rng.uniform(-2.0, 2.0, (40, 3)):
+        pose = coal.Transform3s(np.eye(3), centre)
+        least = np.linalg.norm(points - centre, axis=1).min() - 0.11
+        found = measure(request, coal.Sphere(0.1), pose, cloud).distance
+        assert np.maximum(found, 0.0) == pytest.approx(max(least, 0.0), abs=1e-12)
+        asked = coal.DistanceCallBackDefault()
+        asked.data.request = request
+        manager.distance(coal.CollisionObject(coal.Sphere(0.1), pose), asked)
+        wrong += abs(asked.data.result.min_distance - least) > 1e-3
+    assert wrong > 10
 
 
 def test_the_nearest_part_counts_whatever_its_place_in_the_list() -> None:
@@ -276,6 +300,6 @@ def test_the_faces_of_a_swept_polygon_enclose_it(n: int) -> None:
     """Coal's own volume of the faces it is told: area times length."""
     turn = np.arange(n) * 2.0 * np.pi / n
     ends = [np.column_stack([np.cos(turn), np.sin(turn), 0 * turn + z]) for z in (1, 3)]
-    swept = coal_side._swept(coal, np.vstack(ends))
+    swept = swept_polygon(np.vstack(ends))
     area = n / 2.0 * np.sin(2.0 * np.pi / n)
     assert swept.computeVolume() == pytest.approx(2.0 * area, rel=1e-12)

@@ -25,7 +25,7 @@ from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.urdf import robot_of
 from vdsm_pin.units import in_mm
-from vdsm_pin.verification.coal_hulls import coal_obstacle
+from vdsm_pin.verification.coal_bodies import coal_obstacle
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.moving import joined_tree, obstacle_frames
 from vdsm_pin.verification.records import Pair as NamedPair

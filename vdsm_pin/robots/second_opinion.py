@@ -8,8 +8,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.verification.coal_bodies import CoalBody
-from vdsm_pin.verification.coal_hulls import coal_parts
+from vdsm_pin.verification.coal_hulls import CoalBody, coal_parts
 from vdsm_pin.verification.pinocchio_frames import PinocchioFrames, read_model
 
 KEPT: Final = 8

@@ -8,18 +8,19 @@ to its skin, so that the sign of a body in a mesh has to come from elsewhere.
 """
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.geometry.arrays import FloatArray, frozen, turn_z_to
+from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.solids import (
     Box,
     Capsule,
+    ConvexCover,
     Cylinder,
     HalfSpace,
     Mesh,
@@ -29,23 +30,17 @@ from vdsm_pin.geometry.solids import (
     Sphere,
     Voxels,
 )
+from vdsm_pin.problem.scene import Obstacle, solid_of
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.coal_hulls import (
+    CoalBody,
+    coal_parts,
+    placed,
+    swept_polygon,
+)
 
 GROUP: Final = 64
 """Bodies of a cloud that share a ball around them."""
-
-
-@dataclass(frozen=True, eq=False)
-class CoalBody:
-    """One Coal geometry at its place; an obstacle is one or more of them.
-
-    Args:
-        geometry: A coal.CollisionGeometry.
-        pose: Its coal.Transform3s in the base frame.
-    """
-
-    geometry: Any
-    pose: Any
 
 
 class Measured(NamedTuple):
@@ -63,8 +58,17 @@ class Measured(NamedTuple):
     far: FloatArray
 
 
+NOTHING: Final = Measured(
+    float("inf"), frozen(np.full(3, np.nan)), frozen(np.full(3, np.nan))
+)
+"""The distance to no body at all."""
+
+
 class CoalCloud:
     """Many equal bodies, of which those that can be the nearest are measured.
+
+    Coal's broad-phase managers are of no use: their one result keeps the last closed
+    form, of balls, and not the least.
 
     Args:
         shape: The coal.CollisionGeometry of each.
@@ -77,32 +81,31 @@ class CoalCloud:
         self, shape: Any, rotation: FloatArray, centres: FloatArray, reach: float
     ) -> None:
         centres = centres[coherent_order(centres)]
-        n = len(centres)
         self._shape, self._rotation, self._centres = shape, rotation, centres
-        self._first = np.arange(0, n, GROUP)
-        low = np.minimum.reduceat(centres, self._first)
-        high = np.maximum.reduceat(centres, self._first)
+        first = np.arange(0, len(centres), GROUP)
+        low = np.minimum.reduceat(centres, first)
+        high = np.maximum.reduceat(centres, first)
         self._middle = 0.5 * (low + high)
         self._each = reach
         self._reach = np.linalg.norm(high - self._middle, axis=1) + reach
 
-    def nearest_first(self, geometry: Any, pose: Any) -> Iterator["Group"]:
-        """Groups of the bodies with a lower bound of their distance, least first."""
+    def measured(self, request: Any, geometry: Any, pose: Any) -> Measured:
+        """What Coal says of the nearest body; arguments are those of `measure`."""
         geometry.computeLocalAABB()
-        bounds = _gaps(geometry.aabb_local, pose, self._middle) - self._reach
+        box, best = geometry.aabb_local, NOTHING
+        bounds = _gaps(box, pose, self._middle) - self._reach
         for k in np.argsort(bounds):
-            part = self._centres[self._first[k] : self._first[k] + GROUP]
-            each = _gaps(geometry.aabb_local, pose, part) - self._each
-            yield Group(float(bounds[k]), self._bodies(part, each))
-
-    def _bodies(
-        self, centres: FloatArray, bounds: FloatArray
-    ) -> Iterator[tuple[float, CoalBody]]:
-        import coal
-
-        for k in np.argsort(bounds):
-            pose = coal.Transform3s(np.array(self._rotation), centres[k])
-            yield float(bounds[k]), CoalBody(self._shape, pose)
+            if bounds[k] > max(best.distance, 0.0):
+                break  # where they meet the sign is known
+            group = self._centres[k * GROUP : (k + 1) * GROUP]
+            each = _gaps(box, pose, group) - self._each
+            for i in np.argsort(each):
+                if each[i] > max(best.distance, 0.0):
+                    break
+                body = placed(self._shape, group[i], self._rotation)
+                found = _nearest(request, geometry, pose, (body,))
+                best = min(best, found, key=lambda one: one.distance)
+        return best
 
 
 def _gaps(box: Any, pose: Any, points: FloatArray) -> FloatArray:
@@ -112,25 +115,7 @@ def _gaps(box: Any, pose: Any, points: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(gaps, axis=1))
 
 
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Some bodies of an obstacle.
-
-    Args:
-        bound: Lower bound of their distance; [m].
-        bodies: Made as they are asked for, with a lower bound each, least first.
-    """
-
-    bound: float
-    bodies: Iterable[tuple[float, CoalBody]]
-
-
 CoalObstacle: TypeAlias = tuple[CoalBody, ...] | CoalCloud
-
-NOTHING: Final = Measured(
-    float("inf"), frozen(np.full(3, np.nan)), frozen(np.full(3, np.nan))
-)
-"""The distance to no body at all."""
 
 LARGEST: Final = float(np.finfo(np.float64).max)
 """Coal's way to say that it has no answer, with a minus sign."""
@@ -160,29 +145,21 @@ def coal_bodies(obstacle: Solid) -> CoalObstacle:
 
 def _bodies(coal: Any, obstacle: Solid) -> CoalObstacle:
     match obstacle:
-        case Sphere():
-            return (_placed(coal, coal.Sphere(obstacle.radius), obstacle.centre),)
-        case Capsule():
-            body = coal.Capsule(obstacle.radius, 2.0 * obstacle.half_length)
-            return (_placed(coal, body, obstacle.centre, turn_z_to(obstacle.axis)),)
-        case Cylinder():
-            body = coal.Cylinder(obstacle.radius, 2.0 * obstacle.half_length)
-            return (_placed(coal, body, obstacle.centre, turn_z_to(obstacle.axis)),)
+        case Sphere() | Capsule() | Cylinder():
+            parts = coal_parts(obstacle.pieces)
+            assert parts is not None  # Coal takes all of these
+            return parts
         case Box():
             body = coal.Box(2.0 * obstacle.half_size)
-            return (_placed(coal, body, obstacle.centre, obstacle.rotation),)
+            return (placed(body, obstacle.centre, obstacle.rotation),)
         case HalfSpace():
             normal = obstacle.normal
-            body = coal.Halfspace(normal, float(normal @ obstacle.point))
-            return (_placed(coal, body, np.zeros(3)),)
+            return (placed(coal.Halfspace(normal, float(normal @ obstacle.point))),)
         case Prism():
-            parts = (
-                _swept(coal, _prism_corners(obstacle, section))
-                for section in obstacle.convex_sections
-            )
-            return tuple(_placed(coal, part, np.zeros(3)) for part in parts)
+            hulls = (one for one in obstacle.pieces if isinstance(one, Hull))
+            return tuple(placed(swept_polygon(one.points)) for one in hulls)
         case Mesh():
-            return (_placed(coal, _surface(coal, obstacle), np.zeros(3)),)
+            return (placed(_surface(coal, obstacle)),)
         case PointCloud():
             ball, radius = coal.Sphere(obstacle.radius), obstacle.radius
             return CoalCloud(ball, np.eye(3), obstacle.points, radius)
@@ -190,39 +167,6 @@ def _bodies(coal: Any, obstacle: Solid) -> CoalObstacle:
             cell, half = coal.Box(2.0 * obstacle.half_size), obstacle.half_size
             reach = float(np.linalg.norm(half))
             return CoalCloud(cell, obstacle.rotation, obstacle.centres, reach)
-
-
-def _placed(
-    coal: Any, geometry: Any, p: FloatArray, R: FloatArray | None = None
-) -> CoalBody:
-    rotation = np.eye(3) if R is None else R
-    return CoalBody(geometry, coal.Transform3s(np.array(rotation), np.array(p)))
-
-
-def _prism_corners(prism: Prism, section: FloatArray) -> FloatArray:
-    ends = [np.column_stack([section, np.full(len(section), s)]) for s in prism.span]
-    return np.asarray(prism.origin + np.vstack(ends) @ prism.rotation.T)
-
-
-def _swept(coal: Any, corners: FloatArray) -> Any:
-    """A convex polygon swept along a line, by its corners at both ends, (2 k, 3).
-
-    Coal is told the faces: its own way to find them ends the process where the body
-    is flat. A corner may have below 256 neighbours, so the ends are cut in zigzag.
-    """
-    k = len(corners) // 2
-    zigzag = [i // 2 if i % 2 == 0 else k - 1 - i // 2 for i in range(k)]
-    faces: list[tuple[int, int, int]] = []
-    for i, (a, b, c) in enumerate(zip(zigzag, zigzag[1:], zigzag[2:], strict=False)):
-        low = (a, c, b) if i % 2 else (a, b, c)
-        faces += [low, (k + low[0], k + low[2], k + low[1])]
-    for i in range(k):
-        j = (i + 1) % k
-        faces += [(i, j, k + j), (i, k + j, k + i)]
-    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    points.extend(list(corners))
-    triangles.extend([coal.Triangle(*face) for face in faces])
-    return coal.Convex(points, triangles)
 
 
 def _surface(coal: Any, mesh: Mesh) -> Any:
@@ -239,6 +183,18 @@ def _surface(coal: Any, mesh: Mesh) -> Any:
         )
         raise VerificationFailed(message)
     return bvh
+
+
+def coal_obstacle(obstacle: Obstacle) -> CoalObstacle | None:
+    """An obstacle as Coal has it; None where Coal cannot take a piece of it.
+
+    Raises:
+        VerificationFailed: If Coal refuses the shape.
+    """
+    solid: Solid | ConvexCover = solid_of(obstacle)
+    if isinstance(solid, ConvexCover):
+        return coal_parts(solid.pieces)
+    return coal_bodies(solid)
 
 
 def distance_request() -> Any:
@@ -263,18 +219,9 @@ def measure(request: Any, geometry: Any, pose: Any, bodies: CoalObstacle) -> Mea
     Returns:
         The nearest part's answer; one unusable answer makes the whole unusable.
     """
-    if not isinstance(bodies, CoalCloud):
-        return _nearest(request, geometry, pose, bodies)
-    best = NOTHING
-    for group in bodies.nearest_first(geometry, pose):
-        if group.bound > max(best.distance, 0.0):
-            break  # where they meet the sign is known
-        for bound, body in group.bodies:
-            if bound > max(best.distance, 0.0):
-                break
-            found = _nearest(request, geometry, pose, (body,))
-            best = min(best, found, key=lambda one: one.distance)
-    return best
+    if isinstance(bodies, CoalCloud):
+        return bodies.measured(request, geometry, pose)
+    return _nearest(request, geometry, pose, bodies)
 
 
 def _nearest(

@@ -1,58 +1,72 @@
-"""Convex pieces as Coal has them: hulls of points, balls, capsules, cylinders."""
+"""Convex pieces as Coal's shapes.
+
+`coal.Convex.convexHull` ends the process where points are flat, so that these are
+looked at first; of a swept polygon Coal is told the faces.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, turn_z_to
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
-from vdsm_pin.geometry.solids import ConvexCover, Solid
-from vdsm_pin.problem.scene import Obstacle, solid_of
-from vdsm_pin.verification.coal_bodies import CoalBody, CoalObstacle, coal_bodies
 
 FLAT: Final = 1e-6
 """Coal's hull of points flatter than this part of their size ends the process; [-]."""
 
 
-def coal_obstacle(obstacle: Obstacle) -> CoalObstacle | None:
-    """An obstacle as Coal has it; None where Coal cannot take a piece of it.
+@dataclass(frozen=True, eq=False)
+class CoalBody:
+    """One Coal geometry at its place; an obstacle is one or more of them.
 
-    Raises:
-        VerificationFailed: If Coal refuses the shape.
+    Args:
+        geometry: A coal.CollisionGeometry.
+        pose: Its coal.Transform3s in the base frame.
     """
-    solid: Solid | ConvexCover = solid_of(obstacle)
-    if isinstance(solid, ConvexCover):
-        return coal_parts(solid.pieces)
-    return coal_bodies(solid)
+
+    geometry: Any
+    pose: Any
+
+
+def placed(
+    geometry: Any, p: FloatArray | None = None, R: FloatArray | None = None
+) -> CoalBody:
+    """A geometry at a place, or at the origin of its frame."""
+    import coal
+
+    turn, shift = np.eye(3) if R is None else R, np.zeros(3) if p is None else p
+    return CoalBody(geometry, coal.Transform3s(np.array(turn), np.array(shift)))
 
 
 def coal_parts(pieces: Sequence[Piece]) -> tuple[CoalBody, ...] | None:
-    """Convex pieces of a link as Coal's shapes; None where Coal cannot take one."""
+    """Convex pieces as Coal's shapes; None where Coal cannot take one."""
+    found = [_coal_part(piece) for piece in pieces]
+    known = tuple(part for part in found if part)
+    return known if len(known) == len(found) else None
+
+
+def _coal_part(piece: Piece) -> CoalBody | None:
     import coal
 
-    found = []
-    for piece in pieces:
-        if isinstance(piece, FlatCylinder):
-            shape = coal.Cylinder(piece.radius, 2.0 * piece.half_length)
-            pose = coal.Transform3s(turn_z_to(piece.axis), np.array(piece.centre))
-        elif isinstance(piece, Hull) and len(piece.points) == 1:
-            shape = coal.Sphere(piece.radius)
-            pose = coal.Transform3s(np.eye(3), np.array(piece.points[0]))
-        elif isinstance(piece, Hull) and len(piece.points) == 2:
-            way = piece.points[1] - piece.points[0]
-            length = float(np.linalg.norm(way))
-            if not length > 0.0:
-                return None
-            shape = coal.Capsule(piece.radius, length)
-            middle = piece.points.mean(axis=0)
-            pose = coal.Transform3s(turn_z_to(way / length), middle)
-        elif isinstance(piece, Hull) and (shape := coal_hull(piece.points)):
-            pose = coal.Transform3s(np.eye(3), np.zeros(3))
-        else:
+    if isinstance(piece, FlatCylinder):
+        rod = coal.Cylinder(piece.radius, 2.0 * piece.half_length)
+        return placed(rod, piece.centre, turn_z_to(piece.axis))
+    if not isinstance(piece, Hull):
+        return None
+    points = piece.points
+    if len(points) == 1:
+        return placed(coal.Sphere(piece.radius), points[0])
+    if len(points) == 2:
+        way = points[1] - points[0]
+        length = float(np.linalg.norm(way))
+        if not length > 0.0:
             return None
-        found.append(CoalBody(shape, pose))
-    return tuple(found)
+        rod = coal.Capsule(piece.radius, length)
+        return placed(rod, points.mean(axis=0), turn_z_to(way / length))
+    hull = coal_hull(points)
+    return None if hull is None else placed(hull)
 
 
 def is_solid(points: FloatArray) -> bool:
@@ -79,3 +93,25 @@ def coal_hull(points: FloatArray) -> Any | None:
         except RuntimeError:
             continue
     return None
+
+
+def swept_polygon(corners: FloatArray) -> Any:
+    """A convex polygon swept along a line, by its corners at both ends, (2 k, 3).
+
+    A corner may have below 256 neighbours, so the ends are cut in zigzag.
+    """
+    import coal
+
+    k = len(corners) // 2
+    zigzag = [i // 2 if i % 2 == 0 else k - 1 - i // 2 for i in range(k)]
+    faces: list[tuple[int, int, int]] = []
+    for i, (a, b, c) in enumerate(zip(zigzag, zigzag[1:], zigzag[2:], strict=False)):
+        low = (a, c, b) if i % 2 else (a, b, c)
+        faces += [low, (k + low[0], k + low[2], k + low[1])]
+    for i in range(k):
+        j = (i + 1) % k
+        faces += [(i, j, k + j), (i, k + j, k + i)]
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    points.extend(list(corners))
+    triangles.extend([coal.Triangle(*face) for face in faces])
+    return coal.Convex(points, triangles)

@@ -7,8 +7,8 @@ from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, Obstacle
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.coal_bodies import CoalBody, CoalObstacle
-from vdsm_pin.verification.coal_hulls import coal_obstacle
+from vdsm_pin.verification.coal_bodies import CoalObstacle, coal_obstacle
+from vdsm_pin.verification.coal_hulls import placed
 from vdsm_pin.verification.coal_shapes import CoalShapes
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Pair
@@ -89,7 +89,6 @@ def arm_shapes(
     The base is frame 0 and link k frame k; then come the feed's, which does not turn,
     and those of what moves.
     """
-    import coal
 
     def shape(solid: Obstacle) -> CoalObstacle | None:
         deadline.check()
@@ -97,7 +96,7 @@ def arm_shapes(
 
     n, carried = robot.manipulator.n_links, problem.manipulator.carried
     shapes: list[CoalObstacle | None] = [
-        (CoalBody(rod, coal.Transform3s(local[:3, :3].copy(), local[:3, 3].copy())),)
+        (placed(rod, local[:3, 3], local[:3, :3]),)
         for rod, local in zip(robot.capsules, robot.T_link_capsule, strict=True)
     ]
     frames = [min(k + 1, n) for k in range(len(shapes))]  # the tool is on the last link
