@@ -25,11 +25,12 @@ from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.arm_counterexamples import find_counterexamples
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.coal_arm import arm_poses, arm_shapes
+from vdsm_pin.verification.coal_pairs import arm_shapes
 from vdsm_pin.verification.coal_shapes import Sides
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
@@ -145,10 +146,11 @@ def shown(bounds: FloatArray) -> FloatArray:
 
 def by_coal(obstacle: scene.Obstacle, q: FloatArray) -> FloatArray:
     """Coal's distance of every link at every row, shape (n_rows, N); [m]."""
-    poses = arm_poses(robot(), (q[:, 0], q[:, 1::2], q[:, 2::2]))
+    poses = np.tile(np.eye(3, 4), (len(q), N_LINKS + 2, 1, 1))
+    poses[:, 1:-1] = robot().poses(q[:, 0], q[:, 1::2], q[:, 2::2])[:, :N_LINKS]
     row, link = (a.ravel() for a in np.indices((len(q), N_LINKS)))
-    shapes, number = arm_shapes(robot(), (), (obstacle,))
-    other = np.full(link.size, number[obstacle.name])
+    shapes = arm_shapes(robot(), problem_of(obstacle), NO_LIMIT)
+    other = np.full(link.size, N_LINKS)
     found = shapes.distances(poses, Sides(row, link, other)).distance
     return found.reshape(len(q), N_LINKS)
 
