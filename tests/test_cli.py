@@ -525,6 +525,7 @@ def test_a_certificate_is_written_and_accepted(
     assert told["reason"] in vdsm("check-certificate", proof, other, rows).out
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_the_joint_error_that_the_sturdiest_plan_claims_is_the_one_verified(
     vdsm: Shell, tmp_path: Path
 ) -> None:
@@ -647,6 +648,7 @@ def test_every_command_has_an_answer_for_programs_and_can_be_silent(
     assert needed and all(one["works"] for one in needed)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_batch_can_be_proved_under_errors_with_certificates(
     vdsm: Shell, tmp_path: Path
 ) -> None:
@@ -671,6 +673,7 @@ def test_a_batch_can_be_proved_under_errors_with_certificates(
     assert (lost.status, json.loads(lost.out)[0]["outcome"]) == (1, "infeasible")
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_errors_hold_for_plan_verify_and_batch_alike(
     vdsm: Shell, tmp_path: Path
 ) -> None:

@@ -107,6 +107,7 @@ def test_errors_count_for_their_joint_and_obstacle(
     assert code == (0 if passes else 1), text
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_batch_takes_them_all_and_tells_how_to_repeat_it(tmp_path: Path) -> None:
     _, problem, _, motion, *_ = write(tmp_path)
     errors = ["--joint-error-deg", "0.5,0.5", "--obstacle-error-mm", "a=55.1"]

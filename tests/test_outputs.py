@@ -175,6 +175,7 @@ def test_two_outputs_do_not_share_a_place(
     assert run(*verify, "--certificate", "proof") == 0
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_problem_may_have_the_name_of_any_file_of_a_batch(here: Path) -> None:
     (here / "summary.csv.yaml").write_text(PROBLEM)
     (row,) = run_batch(Batch(("summary.csv.yaml",), here / "out", Settings("fewest")))
@@ -196,6 +197,7 @@ def test_names_that_meet_a_hash_stay_apart() -> None:
     assert len(set(folder_names((*twins, f"{met}.yaml")).values())) == 3
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_batch_leaves_its_inputs_alone(here: Path) -> None:
     out = here / "out"
     batch = Batch(("problem.yaml",), out, Settings("fewest"))

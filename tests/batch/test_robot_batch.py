@@ -84,6 +84,7 @@ def test_each_motion_gets_a_row_a_page_and_a_test_case(folder: Path) -> None:
     assert "cell-clear/report.html" in page
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_the_problem_beside_the_motions_is_no_motion(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -94,6 +95,7 @@ def test_the_problem_beside_the_motions_is_no_motion(
     assert "smallest proved clearance" in said and "not available" not in said
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_endings_may_be_large(folder: Path) -> None:
     for path in (folder / "plans").iterdir():
         path.rename(path.with_suffix(".CSV"))
@@ -102,6 +104,7 @@ def test_endings_may_be_large(folder: Path) -> None:
     assert {row.folder for row in rows} == {"cell-clear", "cell-other", "cell-through"}
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_what_changed_is_done_again(folder: Path) -> None:
     """A motion that is another one now is not taken from the earlier batch."""
     before = {row.folder: row for row in run_batch(asked(folder))}
@@ -134,6 +137,7 @@ def test_what_changes_while_results_are_written_is_done_again(
     assert (again.kept, again.row.outcome) == (False, "refuted")
 
 
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(("degrees", "passes"), [(10.0, True), (20.0, False)])
 def test_errors_are_asked_about(folder: Path, degrees: float, passes: bool) -> None:
     """By 18.5 deg more the arm, 30 deg from the ball, comes nearer than 10 mm."""
@@ -143,6 +147,7 @@ def test_errors_are_asked_about(folder: Path, degrees: float, passes: bool) -> N
     assert (outcomes["cell-clear"] == "certified") is passes
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_certificates_are_written_under_errors(folder: Path) -> None:
     errors = ErrorBox(joint=radians(1.0))
     both = Settings("fewest", errors=errors, certificate=True)
@@ -152,6 +157,7 @@ def test_certificates_are_written_under_errors(folder: Path) -> None:
     assert lines[0]["errors"]["joints_rad"] == {"turn": pytest.approx(radians(1.0))}
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_what_is_missing_is_named(folder: Path) -> None:
     (row,) = run_batch(replace(asked(folder), trajectories=()))
     assert row.outcome == "error"

@@ -88,6 +88,7 @@ def test_every_problem_has_its_row_and_its_folder(reference: Path) -> None:
     assert not (reference / ".unfinished").exists()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_plan_that_draws_too_little_is_no_pass(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -104,17 +105,7 @@ def test_a_plan_that_draws_too_little_is_no_pass(
     assert (suite.tests, suite.failures, suite.errors) == (1, 1, 0)
 
 
-def test_jobs_and_order_change_no_byte(
-    problems: Path, reference: Path, tmp_path: Path
-) -> None:
-    files = [str(problems / f"{name}.yaml") for name in NAMES]
-    run_batch(
-        Batch(tuple(reversed(files)), tmp_path / "out", Settings("paper"), jobs=2)
-    )
-    assert tree(tmp_path / "out") == tree(reference)
-
-
-def test_rows_can_be_read_as_they_come(
+def test_jobs_and_order_change_no_byte_and_rows_can_be_read_as_they_come(
     problems: Path, reference: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, seen = tmp_path / "out", []
@@ -126,13 +117,15 @@ def test_rows_can_be_read_as_they_come(
 
     shown = contextlib.nullcontext(look)
     monkeypatch.setattr("vdsm_pin.batch.run.progress", lambda *_: shown)
-    run_batch(Batch((str(problems),), out, Settings("paper"), jobs=2))
+    files = tuple(str(problems / f"{name}.yaml") for name in reversed(NAMES))
+    run_batch(Batch(files, out, Settings("paper"), jobs=2))
     assert [len(rows) for rows in seen] == [1, 2, 3, 4]
     assert all(later[:-1] == sooner for sooner, later in pairwise(seen))
     assert tree(out) == tree(reference)
     assert not (out / "running.csv").exists()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_resuming_keeps_what_is_intact_and_mends_the_rest(
     problems: Path, reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -178,6 +171,7 @@ def check_kills(problems: Path, reference: Path, out: Path, kills: int) -> None:
         assert tree(out) == tree(reference)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_what_a_killed_batch_was_writing_is_gone_after_the_next(
     problems: Path, reference: Path, tmp_path: Path
 ) -> None:
@@ -215,7 +209,15 @@ def test_a_full_disk_ends_the_batch_and_costs_no_earlier_result(
 def test_killed_and_resumed_is_the_same_to_the_byte(
     problems: Path, reference: Path, tmp_path: Path
 ) -> None:
-    check_kills(problems, reference, tmp_path / "out", 1)
+    """Killed when the first problem is done and the others are being done."""
+    words = command(problems, tmp_path / "out", "--jobs", "2", "--resume")
+    with subprocess.Popen(words, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline()
+        process.kill()
+    ran = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert ran.returncode == 1, ran.stderr
+    assert tree(tmp_path / "out") == tree(reference)
 
 
 @pytest.mark.slow
@@ -247,6 +249,7 @@ def test_ctrl_c_ends_with_what_is_done(tmp_path: Path) -> None:
     assert not (out / ".unfinished").exists()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_ctrl_c_is_heard_even_where_python_loses_it(
     problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -369,6 +372,7 @@ def test_no_process_outlives_a_killed_batch(problems: Path, tmp_path: Path) -> N
         time.sleep(0.1)
 
 
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("keep", ["failed", "none"])
 def test_what_is_not_kept_leaves_its_row(
     problems: Path, reference: Path, tmp_path: Path, keep: str

@@ -27,7 +27,7 @@ HRM8 = built_in("hrm8")
 CALM = Sensors(resolution_deg=0.0, noise_deg=0.0)
 
 
-def bending(rows: int = 40, angle: float = 0.1) -> vp.Trajectory:
+def bending(rows: int = 40, angle: float = 0.05) -> vp.Trajectory:
     """Joint 3 lifts the arm, joint 5 turns it."""
     share = np.linspace(0.0, 1.0, rows)
     alpha, theta = np.zeros((2, rows, 8))
@@ -48,7 +48,7 @@ def calm() -> Simulation:
 @pytest.mark.parametrize("rows", [2, 3, 40])
 def test_rates_and_accelerations_keep_their_limits(rows: int) -> None:
     speed = Speed(joint_deg_s=5.0, joint_deg_s2=20.0, tip_m_s=10.0)
-    motion = bending(rows)
+    motion = bending(rows, angle=0.1)
     times = row_times(HRM8, motion, speed)
     assert times[0] == 0.0
     rates = np.abs(np.diff(motion.joints[:, 1:], axis=0)) / np.diff(times)[:, None]
