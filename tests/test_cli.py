@@ -26,7 +26,7 @@ from vdsm_pin.cli import app, main
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
-from vdsm_pin.report.files import SCHEMA_NAMES, schema
+from vdsm_pin.report.files import SCHEMA_NAMES, BatchRow, schema
 
 COMMANDS = list(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 
@@ -671,6 +671,32 @@ def test_a_batch_can_be_proved_under_errors_with_certificates(
     assert vdsm(*more, "--quiet").out == ""
     lost = vdsm(*words, "--obstacle-error-mm", "900", "--json")
     assert (lost.status, json.loads(lost.out)[0]["outcome"]) == (1, "infeasible")
+
+
+def test_each_problem_of_a_batch_has_the_time_of_a_plan(
+    vdsm: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Oracle: what the batch is asked for. A plan that comes too late is no success."""
+    near = write_problem(tmp_path / "near.yaml", NEAR)
+    asked: list[float | None] = []
+
+    def note(batch: Batch) -> tuple[BatchRow, ...]:
+        asked.append(batch.settings.time_limit)
+        return ()
+
+    words = ["batch", near, "--out", tmp_path / "out", "--strategy", "paper"]
+    with monkeypatch.context() as changed:
+        changed.setattr("vdsm_pin.batch.run.run_batch", note)
+        for cold in (False, True):
+            changed.setattr("vdsm_pin.kept.is_cold", lambda cold=cold: bool(cold))
+            for more in ((), ("--scheduler", "tcp://x:1"), ("--time-limit", "inf")):
+                vdsm(*words, *more)
+    assert asked == [60.0, 600.0, math.inf, 600.0, 600.0, math.inf]
+    monkeypatch.setattr("vdsm_pin.kept.LIMIT", 0.001)
+    monkeypatch.setattr("vdsm_pin.kept.is_cold", lambda: False)
+    ran = vdsm(*words, "--json")
+    (row,) = json.loads(ran.out)
+    assert (ran.status, row["outcome"]) == (1, "time-limit")
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -186,5 +186,7 @@ def test_it_is_cold_until_a_plan_was_made_to_its_end(
     assert kept.is_cold()
     kept.keep("vdsm_pin.planner.some", b"machine code")
     assert kept.is_cold(), "one small run compiles little"
+    assert kept.default_limit() == 600.0
     kept.note_planned()
     assert not kept.is_cold()
+    assert kept.default_limit() == 60.0

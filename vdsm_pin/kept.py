@@ -16,6 +16,10 @@ _DIGEST: Final = hashlib.sha256
 PLANNED: Final = "planned"
 """What is kept once a plan has been made to its end."""
 
+LIMIT: Final = 60.0
+COLD_LIMIT: Final = 600.0
+"""Seconds to plan by default; more until a first plan has made the machine code."""
+
 
 def folders() -> Iterator[Path]:
     """Where files are looked for, and written in the first that can be."""
@@ -34,6 +38,11 @@ def functions(folder: Path) -> int:
 def is_cold() -> bool:
     """Whether no plan was made to its end here yet, so that much is to be compiled."""
     return read(PLANNED) is None
+
+
+def default_limit() -> float:
+    """How long planning may take where nobody says it; [s]."""
+    return COLD_LIMIT if is_cold() else LIMIT
 
 
 def note_planned() -> None:

@@ -33,6 +33,7 @@ from vdsm_pin.errors import (
     VerificationFailed,
 )
 from vdsm_pin.io.atomic import writing
+from vdsm_pin.kept import note_planned
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import HANDED_OUT
 from vdsm_pin.report.facts import batch_row
@@ -121,6 +122,7 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
         plan = plan_to_folder(
             problem, task.strategy, task.aside, task.command, deadline, report=False
         )
+        note_planned()
     order = VerifyOrder(
         problem,
         Path(task.trajectory) if task.trajectory else task.aside / TRAJECTORY,

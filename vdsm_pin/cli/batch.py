@@ -11,10 +11,10 @@ from vdsm_pin.cli.options import (
     AsJson,
     ErrorOptions,
     OutFolder,
+    PlanningTime,
     Quiet,
     SlideErrors,
     Strategy,
-    TimeLimit,
     examples,
     family,
     grouped,
@@ -57,7 +57,7 @@ def batch(
         bool,
         typer.Option("--resume", help="Skip problems that are finished and intact."),
     ] = False,
-    time_limit: TimeLimit = None,
+    time_limit: PlanningTime = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -88,12 +88,15 @@ def batch(
     from vdsm_pin.batch.inputs import passed_over
     from vdsm_pin.batch.run import Batch, Interrupted, run_batch
     from vdsm_pin.batch.task import Settings
+    from vdsm_pin.kept import COLD_LIMIT, default_limit
     from vdsm_pin.report.words import outcome
     from vdsm_pin.text import printable
 
     words = errors.words()
     if slide_error_mm != "0":
         words += ("--slide-error-mm", slide_error_mm)
+    if time_limit is None:  # machines of a cluster may have no machine code yet
+        time_limit = COLD_LIMIT if scheduler else default_limit()
     settings = Settings(
         strategy=strategy,
         keep=keep,

@@ -111,17 +111,13 @@ PlanningTime = Annotated[
     typer.Option(
         min=0.001,
         metavar="SECONDS",
-        help="When to give up; 60 by default, 600 until a first plan has been made, "
-        "inf for never.",
+        help="When to give up (in a batch on each problem); 60 by default, 600 until a "
+        "first plan has been made here and on a cluster, inf for never.",
     ),
 ]
 TimeLimit = Annotated[
     float | None,
-    typer.Option(
-        min=0.001,
-        metavar="SECONDS",
-        help="When to give up; in a batch, on each problem.",
-    ),
+    typer.Option(min=0.001, metavar="SECONDS", help="When to give up."),
 ]
 
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]

@@ -2,7 +2,6 @@
 
 import time
 from contextlib import nullcontext
-from typing import Final
 
 import typer
 
@@ -23,10 +22,6 @@ from vdsm_pin.cli.options import (
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import Deadline, enforced
-
-LIMIT: Final = 60.0
-COLD_LIMIT: Final = 600.0
-"""Seconds to plan by default; more until a first plan has made the machine code."""
 
 commands = family()
 
@@ -58,13 +53,13 @@ def plan(
     """
     from vdsm_pin.app.problems import read_problem
     from vdsm_pin.app.workflow import plan_to_folder
-    from vdsm_pin.kept import is_cold, note_planned
+    from vdsm_pin.kept import default_limit, is_cold, note_planned
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
 
     box, cold = errors.box(), time_limit is None and is_cold()
-    limit = time_limit or (COLD_LIMIT if cold else LIMIT)
+    limit = default_limit() if time_limit is None else time_limit
     deadline, begin = Deadline.after(limit), time.monotonic()
     try:
         with enforced(deadline, grace=0.0):
