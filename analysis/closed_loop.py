@@ -8,6 +8,7 @@ fitted.
 """
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -57,8 +58,17 @@ class Ran:
     file: SimulationFile
 
 
+@cache
+def _ran(scene: str, strategy: str, settings: str) -> Ran:
+    return _run(scene, strategy, Settings.model_validate_json(settings))
+
+
 def run(scene: str, strategy: str, settings: Settings) -> Ran:
-    """Plan, simulate, prove."""
+    """Plan, simulate, prove; once, however often the same is asked for."""
+    return _ran(scene, strategy, settings.model_dump_json())
+
+
+def _run(scene: str, strategy: str, settings: Settings) -> Ran:
     problem = read_problem(f"paper/{scene}")
     robot = load_robot(problem.manipulator)
     trajectory = plan_and_verify(problem, strategy, robot).plan.trajectory
@@ -112,7 +122,8 @@ def markdown(rows: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
              "what is assumed: [docs/simulation.md](../../docs/simulation.md). \"Any "
              "motion within that error\": the largest error of any joint at any step "
              "of the controller fed to the proof as the error of every joint, and that "
-             "of x0 as the base's.", ""]  # fmt: skip
+             "of x0 as the base's. Clearances are proved lower bounds: an undecided "
+             "one may be larger.", ""]  # fmt: skip
     planned, changed = (
         table_lines(list(some[0]), [one.values() for one in some])
         for some in (rows, swept)

@@ -28,6 +28,7 @@ from paper_figures.style import (  # noqa: E402
     place,
     save,
     sheet,
+    shortened,
 )
 from paper_figures.views import SIDE  # noqa: E402
 from PIL import Image  # noqa: E402
@@ -206,6 +207,15 @@ def test_every_picture_the_page_shows_is_there_and_all_are_small() -> None:
         file.stat().st_size for file in REPORTS.parent.rglob("*") if file.is_file()
     ]
     assert sum(sizes) < 5_000_000
+
+
+def test_shortened_paths_stay_where_they_are_and_nothing_else_changes() -> None:
+    svg = '<path id="a1.234567" d="M 30.160592 -0.001 \nL 1.5 46.08 \nC 7 8.999999 z"/>'
+    short = svg.replace("30.160592", "30.16").replace("-0.001", "-0")
+    assert shortened(svg) == short.replace("8.999999", "9")
+    for file in REPORTS.glob("*.svg"):
+        text = file.read_text("utf-8")
+        assert shortened(text) == text, file.name
 
 
 def test_the_moving_picture_moves_and_stays_small() -> None:

@@ -1,6 +1,7 @@
 """The references that need no extra library, on scenes where the answer is known."""
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def test_the_square_across_the_rail_cannot_be_followed(name: str) -> None:
 class Bowl(Task):
     """A penalty whose least place is known."""
 
-    def cost(self, rows: FloatArray) -> FloatArray:
+    def cost(self, rows: FloatArray, below: FloatArray | float = inf) -> FloatArray:
         return np.asarray(((rows - self.tip) ** 2).sum(axis=1))
 
 
@@ -91,6 +92,21 @@ def test_intelligent_algorithms_find_the_bottom_of_a_bowl(name: str) -> None:
     found = getattr(intelligent, name).__wrapped__(task)
     assert (np.abs(found) <= 1.0).all()
     assert task.cost(found[None]) < 0.1 * (bottom**2).sum()
+
+
+def test_a_penalty_is_whole_below_a_bound_and_stays_above_it_elsewhere() -> None:
+    problem = read_problem("paper/obs3")
+    arm, rng = Arm(problem, ROBOT, link_clearance(problem)), np.random.default_rng(9)
+    before, box = np.zeros(arm.nq), np.full(arm.nq, 0.7)
+    task = Task(arm, before, problem.path.corners[1], -box, box, rng)
+    rows = np.vstack([task.first(), 0.1 * task.first()])
+    whole = task.cost(rows)
+    bounds = whole + rng.normal(scale=0.1, size=len(rows))
+    found, below = task.cost(rows, bounds), whole < bounds
+    assert 20 < below.sum() < 180
+    assert (found[below] == whole[below]).all()
+    assert (found[~below] >= bounds[~below]).all()
+    assert (found[~below] < whole[~below]).any(), "something was left out"
 
 
 def test_a_swarm_reaches_a_path_ahead() -> None:

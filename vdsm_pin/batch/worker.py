@@ -122,7 +122,8 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
         plan = plan_to_folder(
             problem, task.strategy, task.aside, task.command, deadline, report=False
         )
-        note_planned()
+        if problem.scene.obstacles:  # without any, little is compiled
+            note_planned()
     order = VerifyOrder(
         problem,
         Path(task.trajectory) if task.trajectory else task.aside / TRAJECTORY,

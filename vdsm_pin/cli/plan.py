@@ -67,7 +67,8 @@ def plan(
         told = nullcontext() if quiet or as_json else shown(limit=limit)
         with enforced(deadline), told:
             file = plan_to_folder(asked, strategy, out, context.obj, deadline)
-        note_planned()
+        if asked.scene.obstacles:  # without any, little is compiled
+            note_planned()
     except OutOfTime as error:  # which tells its time itself
         if cold:
             note_planned()

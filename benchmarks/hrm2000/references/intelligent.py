@@ -9,6 +9,7 @@ bounds, the row before, and where chance comes from; it returns the best row, (n
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
+from math import inf
 from typing import TypeAlias
 
 import numpy as np
@@ -37,17 +38,24 @@ class Task:
     high: FloatArray
     rng: np.random.Generator
 
-    def cost(self, rows: FloatArray) -> FloatArray:
-        """Penalty of joint values, shape (m, n) to (m,)."""
+    def cost(self, rows: FloatArray, below: FloatArray | float = inf) -> FloatArray:
+        """Penalty of joint values, shape (m, n) to (m,).
+
+        Clearance takes three quarters of the time. It is left out for rows that are not
+        below a bound, shape (m,), without it: they cannot be with it.
+        """
         arm, rows = self.arm, np.ascontiguousarray(rows)
         centres = arm.centres(rows)
         off = np.linalg.norm(centres[:, -1] - self.tip, axis=1)
-        room = arm.clearance(centres).min(axis=1)
         cosine = np.cos(rows[:, 1::2]) * np.cos(rows[:, 2::2])
         over = np.maximum(0.0, np.cos(arm.cone) - cosine).sum(axis=1)
         change = np.abs(rows - self.before)[:, 1:].sum(axis=1)
-        missing = np.maximum(0.0, arm.required - room)
-        return np.asarray(MISS * off + TOUCH * missing + over + CHANGE * change)
+        found = np.asarray(MISS * off + over + CHANGE * change)
+        near = found < below
+        if near.any():
+            room = arm.clearance(centres[near]).min(axis=1)
+            found[near] += TOUCH * np.maximum(0.0, arm.required - room)
+        return found
 
     def first(self) -> FloatArray:
         """Members by chance, one of them the row before."""
@@ -132,7 +140,7 @@ def variable_length_evolution(task: Task) -> FloatArray:
         length = lengths + task.rng.integers(-1, 2, len(rows))
         length = np.clip(length, 1, task.arm.n)
         child = np.where(links <= length[:, None], task.inside(child), task.before)
-        found = task.cost(child)
+        found = task.cost(child, values)
         better = found < values
         rows[better], values[better] = child[better], found[better]
         lengths[better] = length[better]
@@ -149,7 +157,7 @@ def particle_swarm(task: Task) -> FloatArray:
         speed = 0.7 * speed + 1.5 * own * (best - rows)
         speed += 1.5 * all_ * (least(best, values) - rows)
         rows = task.inside(rows + speed)
-        found = task.cost(rows)
+        found = task.cost(rows, values)
         better = found < values
         best[better], values[better] = rows[better], found[better]
     return least(best, values)
@@ -181,9 +189,9 @@ def simulated_annealing(task: Task) -> FloatArray:
     for k in range(GENERATIONS):
         heat = (1.0 - k / GENERATIONS) ** 2
         child = task.inside(rows + task.noise(rows, 0.2 * heat))
-        found = task.cost(child)
-        uphill = np.exp(np.minimum(0.0, values - found) / (0.05 * heat))
-        taken = task.rng.random(len(rows)) < uphill
+        uphill = values - 0.05 * heat * np.log(task.rng.random(len(rows)))
+        found = task.cost(child, uphill)
+        taken = found < uphill
         rows[taken], values[taken] = child[taken], found[taken]
         if values.min() < lowest:
             best, lowest = least(rows, values), values.min()
@@ -219,7 +227,7 @@ def bee_colony(task: Task) -> FloatArray:
         beside = rows[chosen]
         way = task.rng.uniform(-1.0, 1.0, rows.shape) * (beside - task.others(rows))
         beside = task.inside(beside + way * (task.rng.random(rows.shape) < 0.2))
-        found = task.cost(beside)
+        found = task.cost(beside, values[chosen])
         for k in np.flatnonzero(found < values[chosen]):
             if found[k] < values[chosen[k]]:
                 rows[chosen[k]], values[chosen[k]] = beside[k], found[k]

@@ -73,24 +73,43 @@ def postures(arm: Arm, rng: np.random.Generator) -> FloatArray:
     return np.hstack([x0, angles.reshape(POSTURES, -1)])
 
 
+class Learnt:
+    """A network trained for one arm, with what its inputs and answers are scaled by."""
+
+    def __init__(self, arm: Arm) -> None:
+        rng = np.random.default_rng(0)
+        joints = postures(arm, rng)
+        tips = arm.centres(joints)[:, -1]
+        self.middle, self.spread = tips.mean(axis=0), tips.std(axis=0)
+        self.centre, self.scale = joints.mean(axis=0), joints.std(axis=0)
+        self.network = Network(3, arm.nq, rng)
+        inputs, wanted = self.scaled(tips), (joints - self.centre) / self.scale
+        self.network.train(inputs, wanted, rng)
+
+    def scaled(self, tips: FloatArray) -> FloatArray:
+        """Tips as the network is given them, shape (r, 3)."""
+        return np.asarray((tips - self.middle) / self.spread)
+
+    def reach(self, arm: Arm, q: FloatArray, tip: FloatArray) -> FloatArray:
+        """Joint values for a tip; those before are not looked at."""
+        answer = self.network.layers(self.scaled(tip)[None])[-1][0]
+        return arm.bounded(self.centre + self.scale * answer)
+
+
+_LEARNT: dict[tuple[bytes, float], Learnt] = {}
+"""By the lengths of the links and the x of the start: training sees no more."""
+
+
 def follow(
     problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
 ) -> Trajectory:
-    """Trained for this arm, then asked row after row; the judge has the rest to say.
+    """Trained once for an arm, then asked row after row; the judge has the rest to say.
 
     Raises:
         NoPlanFound: If two rows are too far apart.
     """
-    arm, rng = Arm(problem, robot, clearance), np.random.default_rng(0)
-    joints = postures(arm, rng)
-    tips = arm.centres(joints)[:, -1]
-    middle, spread = tips.mean(axis=0), tips.std(axis=0)
-    centre, scale = joints.mean(axis=0), joints.std(axis=0)
-    network = Network(3, arm.nq, rng)
-    network.train((tips - middle) / spread, (joints - centre) / scale, rng)
-
-    def reach(arm: Arm, q: FloatArray, tip: FloatArray) -> FloatArray:
-        answer = network.layers(((tip - middle) / spread)[None])[-1][0]
-        return arm.bounded(centre + scale * answer)
-
-    return along(arm, reach)
+    arm = Arm(problem, robot, clearance)
+    key = problem.manipulator.link_lengths.tobytes(), float(problem.path.start[0])
+    if key not in _LEARNT:
+        _LEARNT[key] = Learnt(arm)
+    return along(arm, _LEARNT[key].reach)
