@@ -4,7 +4,7 @@ Pinocchio is imported inside the functions, so that commands that do not verify 
 without it, and its failures are translated here.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,20 +48,27 @@ class PinocchioFrames:
         Args:
             q: As Pinocchio has it, shape (n_rows, model.nq); [rad], [m].
         """
+        found = self._read(q, lambda one: [one.rotation.T.reshape(-1), one.translation])
+        return found.reshape(len(q), -1, 4, 3).swapaxes(2, 3)
+
+    def origins(self, q: FloatArray) -> FloatArray:
+        """The origins of the links alone, sooner, shape (n_rows, n_links, 3); [m]."""
+        return self._read(q, lambda one: [one.translation]).reshape(len(q), -1, 3)
+
+    def _read(
+        self, q: FloatArray, parts: Callable[[Any], list[FloatArray]]
+    ) -> FloatArray:
+        """Some parts of each pose, one after the other, (n_rows, size of all)."""
         import pinocchio as pin
 
         data = self.model.createData()
-        # Views of what is overwritten row by row: the columns of each pose.
-        live = [
-            part
-            for place in (data.oMf[number] for number in self.numbers)
-            for part in (place.rotation.T.reshape(-1), place.translation)
-        ]
-        found = np.zeros((len(q), 12 * len(self.numbers)))
+        # Views of what is overwritten row by row.
+        live = [part for number in self.numbers for part in parts(data.oMf[number])]
+        found = np.zeros((len(q), sum(part.size for part in live)))
         for row, values in zip(found, q, strict=True):
             pin.framesForwardKinematics(self.model, data, values)
             np.concatenate(live, out=row)
-        return found.reshape(len(q), -1, 4, 3).swapaxes(2, 3)
+        return found
 
 
 def read_model(text: str, *root: Any) -> Any:

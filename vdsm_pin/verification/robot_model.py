@@ -57,6 +57,19 @@ class RobotModel:
         Raises:
             InvalidInput: If the arrays do not fit this arm.
         """
+        return self.frames.poses(self._rows(x0, alpha, theta))
+
+    def joint_centres(
+        self, x0: FloatArray, alpha: FloatArray, theta: FloatArray
+    ) -> FloatArray:
+        """Joint centres O_1..O_{N+1} by Pinocchio, shape (n_samples, N + 1, 3); [m].
+
+        Arguments and errors are those of `poses`.
+        """
+        return self.frames.origins(self._rows(x0, alpha, theta))
+
+    def _rows(self, x0: FloatArray, alpha: FloatArray, theta: FloatArray) -> FloatArray:
+        """Rows of q as Pinocchio has it."""
         expected = x0.size, self.manipulator.n_links
         if alpha.shape != expected or theta.shape != expected:
             message = (
@@ -66,16 +79,7 @@ class RobotModel:
             raise InvalidInput(message)
         q = np.zeros((x0.size, self.model.nq))
         q[:, 0], q[:, 1::2], q[:, 2::2] = x0, alpha, theta
-        return self.frames.poses(q)
-
-    def joint_centres(
-        self, x0: FloatArray, alpha: FloatArray, theta: FloatArray
-    ) -> FloatArray:
-        """Joint centres O_1..O_{N+1} by Pinocchio, shape (n_samples, N + 1, 3); [m].
-
-        Arguments and errors are those of `poses`.
-        """
-        return self.poses(x0, alpha, theta)[..., 3]
+        return q
 
 
 def load_robot(manipulator: Manipulator) -> RobotModel:
