@@ -6,7 +6,7 @@ import pytest
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls, Piece
 from vdsm_pin.geometry.solids import BOX_CORNERS
-from vdsm_pin.robots.contacts import Placed, common_ball
+from vdsm_pin.verification.contacts import Placed, common_ball
 
 BALL = Hull(np.zeros((1, 3)), 0.1)
 CAPSULE = Hull(np.array([[0.0, 0.0, -0.2], [0.0, 0.0, 0.2]]), 0.1)

@@ -292,6 +292,38 @@ def test_a_half_space_cannot_be_turned(tmp_path: Path) -> None:
         files.verify(box)
 
 
+@pytest.mark.parametrize(("off", "turn"), [(0, 30), (50, 0), (89.9, 30), (90.1, 0)])
+@pytest.mark.parametrize("shape", ["box", "cylinder", "another body"])
+def test_bodies_that_nothing_grows_are_refuted_where_they_meet(
+    shape: str, off: float, turn: float, tmp_path: Path
+) -> None:
+    """A box of 60 mm in a wall, 0 mm required. Oracle: the halves of both."""
+    near = {"link": 1, "shape": "box", "center": [200.0, 200.0, 0.0]}
+    box = near | {"name": "box", "size": [60.0, 60.0, 60.0], "rpy_deg": [turn, 0, 0]}
+    other = {"name": "other", "center": [200.0 + off, 200.0, 0.0]}
+    match shape:
+        case "box":
+            other |= {"shape": "box", "size": [120.0, 300.0, 300.0]}
+        case "cylinder":
+            more = {"axis": [1, 0, 0], "radius": 150.0, "length": 120.0}
+            other |= {"shape": "cylinder", **more}
+        case _:
+            other |= {"shape": "box", "size": [120.0, 300.0, 300.0], "link": 3}
+            other["center"] = [off - 500.0, 200.0, 0.0]
+    mine = [box, other] if "link" in other else [box]
+    data = problem(*mine, obstacles=[] if "link" in other else [other])
+    ignored = [["other", f"link {k}"] for k in (1, 2)]
+    data["manipulator"]["ignore_pairs"] = ignored if len(mine) > 1 else []
+    data |= {"required_clearance": 0.0, "required_self_clearance": 0.0}
+    found = Files(tmp_path, data, STILL).verify()
+    meet = off < 90.0
+    assert found.verdict is (Verdict.REFUTED if meet else Verdict.CERTIFIED)
+    row = next(c for c in found.checks if "box and other" in c.where)
+    assert row.verdict is found.verdict
+    assert not meet or (off - 90.0) / 1000.0 <= row.worst < 0.0
+    assert meet or row.worst == pytest.approx((off - 90.0) / 1000.0, abs=1e-8)
+
+
 # ---- random bodies -------------------------------------------------------------------
 
 

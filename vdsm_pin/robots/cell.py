@@ -16,7 +16,6 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.contacts import Placed
 from vdsm_pin.robots.errors import check_errors, proof_box
 from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
@@ -27,6 +26,7 @@ from vdsm_pin.robots.urdf import robot_of
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.coal_bodies import coal_obstacle
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
+from vdsm_pin.verification.contacts import Placed
 from vdsm_pin.verification.moving import joined_tree, obstacle_frames
 from vdsm_pin.verification.records import Pair as NamedPair
 

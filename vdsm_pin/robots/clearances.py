@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -12,16 +12,9 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.contacts import common_ball
-from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.brackets import LeastClearances
+from vdsm_pin.verification.contacts import BESIDE, MEETING, common_ball
 from vdsm_pin.verification.moving import Knots
-
-MEETING: Final = 2.0 * TOLERANCES.bracket_gap
-"""Bodies that come so near may meet; [m]."""
-
-BESIDE: Final = (0.0, 0.01, -0.01, 0.05, -0.05)
-"""Where a ball in both is looked for, beside the moment at which bodies meet; [-]."""
 
 
 def least_clearances(
@@ -74,7 +67,7 @@ def _met(
     """The same, with the balls in both bodies that are found."""
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
     changed = dict[int, tuple[Any, ...]]()
-    beside = min(1.0, span[1] - span[0]) * np.array(BESIDE)
+    beside = min(1.0, span[1] - span[0]) * BESIDE
     for k in np.flatnonzero(near).tolist():
         moment = least.interval[k] + least.share[k]
         middle = 0.5 * (least.link_point[k] + least.other_point[k])

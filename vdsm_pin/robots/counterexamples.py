@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.contacts import common_ball
 from vdsm_pin.robots.errors import joint_errors
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.brackets import LeastClearances
@@ -66,9 +65,6 @@ def _erring_pair(cell: Cell, path: Path, k: int, named: Pair) -> ErringPair:
     pair, tree = cell.pairs[k], cell.tree
     one, other = cell.bodies[pair.one], cell.bodies[pair.other]
 
-    def ball(q: FloatArray, middle: FloatArray) -> tuple[float, FloatArray]:
-        return common_ball(*cell.placed(pair, cell.poses(q[None])[0]), middle)
-
     n, sizes = len(cell.robot.joints), np.zeros(tree.n_columns)
     sizes[:n] = joint_errors(cell.robot.joints, cell.errors)
     return ErringPair(
@@ -80,7 +76,6 @@ def _erring_pair(cell: Cell, path: Path, k: int, named: Pair) -> ErringPair:
         sizes=sizes,
         grown=grown_by(cell.errors, named),
         n_joints=n,
-        common_ball=ball,
     )
 
 

@@ -15,9 +15,10 @@ from vdsm_pin.proof.prover import start_proof, summed
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.clearances import MEETING, least_clearances
+from vdsm_pin.robots.clearances import least_clearances
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.brackets import LeastClearances
+from vdsm_pin.verification.contacts import MEETING
 from vdsm_pin.verification.first_contact import (
     FirstContact,
     Judged,

@@ -126,18 +126,6 @@ def covering_primitive(points: FloatArray) -> Hull:
     return (box, ball, capsule)[int(np.argmin(volumes))]
 
 
-def hull_planes(points: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Planes n.x = d of the faces of a hull; None where `coal_hull` has none.
-
-    Returns:
-        Outward unit normals, shape (n_faces, 3), and offsets, shape (n_faces,); [m].
-    """
-    hull = coal_hull(points)
-    if hull is None:
-        return None
-    return np.array(hull.normals()), -np.array(hull.offsets()).ravel()
-
-
 def hull_triangles(points: FloatArray) -> tuple[FloatArray, IntArray] | None:
     """Corners and triangles of a hull; None where `coal_hull` has none.
 

@@ -16,7 +16,6 @@ from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.robots.by_itself import limit_checks, pose_check
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.clearances import (
-    MEETING,
     least_clearances,
     least_in_rows,
 )
@@ -37,6 +36,7 @@ from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
 from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_shapes import disagreement
+from vdsm_pin.verification.contacts import MEETING
 from vdsm_pin.verification.enclosed import enclosed_least
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS_OUTSIDE, check_inside

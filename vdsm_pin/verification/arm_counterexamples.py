@@ -1,19 +1,22 @@
 """What the proof for an error box leaves undecided of an arm, as the search asks it."""
 
+from dataclasses import replace
 from functools import partial
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm.tree import arm_tree, link_frame
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.bodies import Body
-from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.clearance import ClearanceProof
+from vdsm_pin.verification.contacts import BESIDE, MEETING
 from vdsm_pin.verification.counterexample import (
     ErringPair,
     Moment,
@@ -24,6 +27,9 @@ from vdsm_pin.verification.counterexample import (
 from vdsm_pin.verification.moving import joined_tree, obstacle_frames, whole_rows
 from vdsm_pin.verification.records import Counterexample, Pair
 from vdsm_pin.verification.task import ball_of
+
+MOST_MEETINGS: Final = 32
+"""Pairs in which a ball in both is looked for."""
 
 
 def erring_pair(
@@ -55,6 +61,39 @@ def erring_pair(
         n_joints=1 + angles.size,
         ball=ball_of(problem, pair),
     )
+
+
+def with_meetings(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    proof: ClearanceProof,
+    deadline: Deadline = NO_LIMIT,
+) -> ClearanceProof:
+    """The proof with pairs refuted of which a ball is proved to lie in both bodies.
+
+    No depth is measured of bodies that nothing grows: where they meet their clearance
+    is 0 at most, which refutes no required clearance of 0.
+    """
+    counts, best = proof.counts.copy(), proof.best.copy()
+    open_ = (counts[:, UNDECIDED] > 0) & (counts[:, REFUTED] == 0)
+    near = np.flatnonzero(open_ & (best[:, UP] <= MEETING))
+    for k in near[:MOST_MEETINGS].tolist():
+        if deadline.passed:
+            break
+        asked = erring_pair(problem, trajectory, proof.pairs[k], ErrorBox())
+        middle = 0.5 * (best[k, OWN:OTHER] + best[k, OTHER:])
+        moments = best[k, AT_UPPER] + best[k, TIME] + BESIDE
+        moments = np.clip(moments, 0.0, trajectory.n_samples - 1.0)
+        for moment, q in zip(moments.tolist(), asked.rows(moments), strict=True):
+            radius, centre = asked.common_ball(q, middle)
+            if radius > 0.0:
+                interval = min(int(moment), proof.n_intervals - 1)
+                best[k, UP:OWN] = -radius, interval, moment - interval
+                best[k, OWN:] = np.tile(centre, 2)
+                counts[k] += np.eye(3, dtype=np.int64)[REFUTED]
+                counts[k, UNDECIDED] -= 1
+                break
+    return replace(proof, counts=frozen(counts, np.int64), best=frozen(best))
 
 
 def of_best(row: FloatArray) -> tuple[Moment, ...]:

@@ -115,3 +115,15 @@ def swept_polygon(corners: FloatArray) -> Any:
     points.extend(list(corners))
     triangles.extend([coal.Triangle(*face) for face in faces])
     return coal.Convex(points, triangles)
+
+
+def hull_planes(points: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Planes n.x = d of the faces of a hull; None where `coal_hull` has none.
+
+    Returns:
+        Outward unit normals, shape (n_faces, 3), and offsets, shape (n_faces,); [m].
+    """
+    hull = coal_hull(points)
+    if hull is None:
+        return None
+    return np.array(hull.normals()), -np.array(hull.offsets()).ravel()

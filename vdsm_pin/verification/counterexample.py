@@ -9,7 +9,7 @@ without two witness points.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.contacts import Placed, common_ball
 from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import Counterexample, Pair, is_deepest
 
@@ -59,11 +60,6 @@ class Moment:
     share: float
 
 
-CommonBall: TypeAlias = Callable[[FloatArray, FloatArray], tuple[float, FloatArray]]
-"""Of a row of all columns and a point: a ball in both bodies near it, radius 0 if none
-is found, and its centre; [m]."""
-
-
 @dataclass(frozen=True)
 class ErringPair:
     """Whether two bodies of a tree come too near within an error box.
@@ -79,8 +75,6 @@ class ErringPair:
             obstacle are left out: what is found holds without them; [m].
         n_joints: Columns that are told; others are of what moves beside.
         ball: Radius of what the first body is grown by, as deep as is measured; [m].
-        common_ball: Proves that bodies meet of which no depth is measured; None where
-            that is not needed.
     """
 
     pair: Pair
@@ -92,7 +86,14 @@ class ErringPair:
     grown: float
     n_joints: int
     ball: float = 0.0
-    common_ball: CommonBall | None = None
+
+    def common_ball(
+        self, q: FloatArray, middle: FloatArray
+    ) -> tuple[float, FloatArray]:
+        """A ball in both bodies at a row of q, looked for about a point, as proved."""
+        (poses,) = self.tree.poses(q[None])
+        one, other = (Placed(x.pieces, poses[x.frame]) for x in self.bodies)
+        return common_ball(one, other, middle)
 
 
 def grown_by(errors: ErrorBox, pair: Pair) -> float:
@@ -205,7 +206,7 @@ class Search:
         proof = prove(asked.tree, asked.bodies, Path(q[None]), [pair])
         upper, points = float(proof.upper[0]), proof.points[0]
         refuted = proof.verdict[0] == REFUTED
-        if asked.common_ball and not refuted and upper <= self.limit:
+        if not refuted and upper <= self.limit:
             radius, centre = asked.common_ball(q, points.mean(axis=0))
             upper, points, refuted = -radius, np.array([centre, centre]), radius > 0.0
         if not refuted:

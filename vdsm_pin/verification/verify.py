@@ -18,7 +18,10 @@ from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.approaches import closest_approaches
-from vdsm_pin.verification.arm_counterexamples import find_counterexamples
+from vdsm_pin.verification.arm_counterexamples import (
+    find_counterexamples,
+    with_meetings,
+)
 from vdsm_pin.verification.best_effort import BestEffort, guarded
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.clearance import (
@@ -214,6 +217,7 @@ class _Judgement:
             deadline=self.deadline,
             reach=math.inf if inside else reach,
         )
+        proof = with_meetings(problem, trajectory, proof, self.deadline)
         too_close = noted.noted if proof.sent == proof.n_intervals else None
         return _Proved(proof, lowers.proved(proof), too_close)
 

@@ -27,8 +27,8 @@ from vdsm_pin.geometry.depths import (
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.proof.tree import IDENTITY
-from vdsm_pin.robots.hulls import hull_planes
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.coal_hulls import hull_planes
 
 CORNERS: Final = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 3**0.5
 """Of a tetrahedron about the origin whose inner ball has a third of their distance."""
@@ -41,6 +41,13 @@ MOST_PIECES: Final = 64
 
 KEPT: Final = 128
 """Hulls whose planes are kept."""
+
+
+MEETING: Final = 2.0 * TOLERANCES.bracket_gap
+"""Bodies that come so near may meet; [m]."""
+
+BESIDE: Final = np.array([0.0, 0.01, -0.01, 0.05, -0.05])
+"""Where a ball in both is looked for, beside the moment at which bodies meet; [-]."""
 
 
 class Placed(NamedTuple):
