@@ -11,17 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from vdsm_pin.cli import (
-    afterwards,
-    batch,
-    export,
-    formats,
-    plan,
-    repair,
-    start,
-    verify,
-    view,
-)
+from vdsm_pin.cli import afterwards, batch, plan, start, verify, view
 from vdsm_pin.cli.ending import BAD_INPUT, fail, nobody_reads
 from vdsm_pin.cli.options import NOT_PASSED, PASSED
 from vdsm_pin.errors import InvalidInput, VdsmError
@@ -37,7 +27,7 @@ app = typer.Typer(
     epilog="Exit status: 0 certified; 1 incomplete, refuted, undecided or infeasible; "
     "2 bad input.",
 )
-for module in (plan, verify, repair, batch, view, export, start, formats, afterwards):
+for module in (plan, verify, batch, view, start, afterwards):
     app.add_typer(module.commands)
 
 

@@ -8,12 +8,11 @@ import typer
 from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
-    AsJson,
+    Answer,
     ErrorOptions,
     OutFolder,
     PlanningTime,
     ProblemArgument,
-    Quiet,
     Strategy,
     examples,
     family,
@@ -41,8 +40,7 @@ def plan(
     strategy: Strategy = DEFAULT_STRATEGY,
     errors: ErrorOptions,
     time_limit: PlanningTime = None,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    answer: Answer,
 ) -> None:
     """Plan a motion.
 
@@ -64,7 +62,7 @@ def plan(
     try:
         with enforced(deadline, grace=0.0):
             asked = read_problem(problem).under(box)
-        told = nullcontext() if quiet or as_json else shown(limit=limit)
+        told = nullcontext() if any(answer) else shown(limit=limit)
         with enforced(deadline), told:
             file = plan_to_folder(asked, strategy, out, context.obj, deadline)
         if asked.scene.obstacles:  # without any, little is compiled
@@ -83,9 +81,9 @@ def plan(
     except Infeasible as error:
         error.args = (f"{error}{_see(error)}",)
         raise
-    if as_json:
+    if answer.as_json:
         typer.echo(file.text(), nl=False)
-    elif not quiet:
+    elif not answer.quiet:
         show_plan(file, out)
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
 

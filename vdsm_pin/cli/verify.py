@@ -1,18 +1,17 @@
-"""`vdsm verify`: of an arm by a problem, of any other robot by its URDF."""
+"""`vdsm verify`, `vdsm repair`: of an arm by a problem, of a robot by its URDF too."""
 
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
-    AsJson,
+    Answer,
     ErrorOptions,
     OutFolder,
-    Quiet,
     SlideErrors,
     TimeLimit,
     Trajectory,
@@ -33,19 +32,6 @@ if TYPE_CHECKING:
 commands = family()
 
 Interpolation = Literal["auto", "linear", "cubic", "quintic"]
-
-
-class Console(NamedTuple):
-    """What goes to the terminal."""
-
-    quiet: bool
-    as_json: bool
-
-    def progress(self) -> AbstractContextManager[None]:
-        """A bar, where somebody looks at it."""
-        from vdsm_pin.progress import shown
-
-        return nullcontext() if self.quiet or self.as_json else shown(lines=False)
 
 
 @commands.command(
@@ -90,8 +76,7 @@ def verify(
             "velocities (cubic) and accelerations (quintic) of the trajectory."
         ),
     ] = "auto",
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    answer: Answer,
     robot: RobotOptions,
     topic: Topic = None,
 ) -> None:
@@ -106,7 +91,6 @@ def verify(
         "--all-pairs": all_pairs,
         "--interpolation": interpolation != "auto",
     }
-    console = Console(quiet, as_json)
     deadline = Deadline.after(time_limit)
     box = errors.box(slide_error_mm)
     from vdsm_pin.app.motions import MotionOptions
@@ -128,7 +112,7 @@ def verify(
             all_pairs=all_pairs,
             date=now(),
         )
-    raise typer.Exit(PASSED if _passes(order, console) else NOT_PASSED)
+    raise typer.Exit(PASSED if _passes(order, answer) else NOT_PASSED)
 
 
 def asked_problem(
@@ -175,13 +159,15 @@ def _stated(
     return stated_cell(asked, robot.files(), robot.scene, certificate, motion)
 
 
-def _passes(order: "VerifyOrder", console: Console) -> bool:
+def _passes(order: "VerifyOrder", answer: Answer) -> bool:
     """Verify a motion, and say what was found."""
     from vdsm_pin.app.workflow import verify_to_folder
+    from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
 
-    with enforced(order.options.deadline), console.progress():
+    bar = nullcontext() if any(answer) else shown(lines=False)
+    with enforced(order.options.deadline), bar:
         verified = verify_to_folder(order)
     written: list[tuple[str, str]] = []
     if order.certificate is not None:
@@ -195,9 +181,64 @@ def _passes(order: "VerifyOrder", console: Console) -> bool:
             written.append(("its problem file", str(beside)))
     if order.pdf is not None:
         written.append(("report on paper", str(order.pdf)))
-    if console.as_json:
+    if answer.as_json:
         typer.echo(verified.file.text(), nl=False)
-    elif not console.quiet:
+    elif not answer.quiet:
         show_verification(verified.file, order.folder, *written)
     complete = order.certificate is None or not verified.no_certificate
     return outcome(verified.file.verdict).passed and complete
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm repair paper/obs1 --trajectory mine.csv --out out/mine",
+        "vdsm repair cell.yaml --trajectory plan.csv --out out/cell",
+        "vdsm repair --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
+        "--trajectory plan.csv --out out/ur5",
+    )
+)
+@grouped
+def repair(
+    context: typer.Context,
+    trajectory: Trajectory,
+    out: OutFolder,
+    *,
+    problem: ProblemOrNone = None,
+    robot: RobotOptions,
+    topic: Topic = None,
+    pin: Annotated[
+        list[int] | None,
+        typer.Option(metavar="ROW", help="A waypoint, from 0, that stays."),
+    ] = None,
+    time_limit: TimeLimit = None,
+    answer: Answer,
+) -> None:
+    """Mend a trajectory until it is certified.
+
+    Moves its waypoints; of a snake arm the tip stays on its path. Writes
+    trajectory.csv, repair.json (how far each waypoint moved) and what verify writes;
+    where no such trajectory is found, nothing, and says why.
+    """
+    from vdsm_pin.app.motions import MotionOptions
+    from vdsm_pin.app.repair import repair_to_folder
+    from vdsm_pin.app.workflow import VerifyOrder
+    from vdsm_pin.problem.error_boxes import ErrorBox
+
+    deadline = Deadline.after(time_limit)
+    with enforced(deadline, grace=0.0):
+        asked = asked_problem(problem, ErrorBox(), robot, {}, topic)
+    with enforced(deadline):
+        options = MotionOptions(deadline, topic=topic)
+        order = VerifyOrder(asked, trajectory, out, context.obj, options=options)
+        found = repair_to_folder(order, tuple(pin or ()))
+    new, most = int((found.given < 0).sum()), found.moved.max()
+    changed = f"{new} of them new; moved by {most:.6f} rad (m) at most"
+    how = changed if new or most else "none of them moved: it was clear as given"
+    answer.tell(
+        f"certified with {len(found.moved)} waypoints, {how}; wrote {out}",
+        verdict="certified",
+        waypoints=len(found.moved),
+        new=new,
+        moved_at_most=float(most),
+        folder=out,
+    )

@@ -1,11 +1,18 @@
-"""`vdsm view`."""
+"""`vdsm view`, `vdsm export`: a motion as it looks."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import ProblemArgument, ShownMotion, examples, family
+from vdsm_pin.cli.options import (
+    Answer,
+    ProblemArgument,
+    ShownMotion,
+    examples,
+    family,
+    grouped,
+)
 
 commands = family()
 
@@ -46,3 +53,66 @@ def view(
         typer.echo(f"wrote {html}")
         return
     serve(problem, trajectory, port=port, watch=watch, announce=typer.echo)
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm export paper/obs1 --trajectory out/obs1/trajectory.csv --out obs1.glb",
+        "vdsm export mine.yaml --trajectory mine.csv --out mine.png --moment 120",
+        "vdsm export mine.yaml --trajectory mine.csv --out mine.mp4 --look tip",
+    ),
+)
+@grouped
+def export(
+    problem: ProblemArgument,
+    out: Annotated[
+        Path,
+        typer.Option(metavar="FILE", help=".glb (glTF), .png or .mp4 (needs ffmpeg)."),
+    ],
+    trajectory: ShownMotion = None,
+    moment: Annotated[
+        float,
+        typer.Option(
+            min=0.0, metavar="WAYPOINT", help="Of a .png; 12.5 is between two."
+        ),
+    ] = 0.0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1,
+            metavar="SECONDS",
+            help="How long it plays; 10, or as the trajectory's times say.",
+        ),
+    ] = None,
+    look: Annotated[
+        str,
+        typer.Option(
+            metavar="VIEW",
+            help="overview, side, top, front, tip, or a direction: 1,-1,0.5.",
+        ),
+    ] = "overview",
+    width: Annotated[
+        int, typer.Option(min=64, max=4096, metavar="PIXELS", help="Of the picture.")
+    ] = 1280,
+    height: Annotated[
+        int, typer.Option(min=64, max=4096, metavar="PIXELS", help="Of the picture.")
+    ] = 720,
+    numbers: Annotated[
+        bool, typer.Option("--numbers", help="Number the links.")
+    ] = False,
+    *,
+    answer: Answer,
+) -> None:
+    """Write a motion as glTF, as a picture or as a film.
+
+    PNG and MP4 are drawn by a Chromium or Chrome of this machine, without a window.
+    """
+    from vdsm_pin.app.export import ExportOrder
+    from vdsm_pin.app.export import export as write
+    from vdsm_pin.app.problems import read_problem
+    from vdsm_pin.report.film import Shot, look_of
+
+    shot = Shot(look_of(look), width - width % 2, height - height % 2, numbers)
+    asked = read_problem(problem)
+    write(ExportOrder(asked, trajectory, out, moment, seconds, shot))
+    answer.tell(f"wrote {out}", file=out)
