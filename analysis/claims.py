@@ -142,7 +142,7 @@ def avoidance(runs: Runs) -> tuple[Claim, Claim]:
         run = runs(scene, "paper")
         kept.append(f"{scene} {run.verification.min_clearance * MM_PER_M:.2f} mm")
         robot = load_robot(run.problem.manipulator)
-        judged = verify(run.problem, run.trajectory, robot, errors=box)
+        judged = verify(run.problem.under(box), run.trajectory, robot)
         worst = min(one.clearance for one in judged.counterexamples)
         lost.append(f"{scene} {worst * MM_PER_M:.1f} mm")
         error = np.rad2deg(touching_error(run.refinement))

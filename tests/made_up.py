@@ -13,7 +13,6 @@ from vdsm_pin.geometry.solids import (
     Sphere,
 )
 from vdsm_pin.problem.desired_path import DesiredPath
-from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
@@ -115,7 +114,6 @@ def verification(
     return ArmVerification(
         problem=task,
         trajectory=rows,
-        errors=ErrorBox(),
         pairs=pairs,
         checks=checks,
         approaches=closest,

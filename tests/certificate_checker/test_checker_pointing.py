@@ -88,7 +88,7 @@ class Looking:
     def look(self, errors: ErrorBox = NO_ERRORS) -> float:
         """Write a certificate; the proved bound of the angle; [deg]."""
         file, rows = read_problem(self.problem), read_trajectory(self.rows, ARM)
-        found = verify(file, rows, load_robot(ARM), errors=errors)
+        found = verify(file.under(errors), rows, load_robot(ARM))
         row = next(check for check in found.checks if check.name == NAME)
         assert found.verdict.value == "certified", found.checks
         hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()))

@@ -329,7 +329,7 @@ def test_the_arm_of_a_counterexample_is_a_ghost_at_its_moment(
     )  # fmt: skip
     judged = replace(
         judged,
-        errors=ErrorBox(joint=0.05, base=0.001),
+        problem=judged.problem.under(ErrorBox(joint=0.05, base=0.001)),
         counterexamples=(found,),
         nominal_clear=True,
     )

@@ -79,7 +79,6 @@ def test_undefined_numbers_become_null_and_never_pass() -> None:
     bare = ArmVerification(
         problem=judged.problem,
         trajectory=judged.trajectory,
-        errors=judged.errors,
         pairs=judged.pairs,
         checks=checks,
         approaches=(),

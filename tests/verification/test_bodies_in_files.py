@@ -82,7 +82,8 @@ class Files:
     def verify(self, errors: ErrorBox | None = None) -> Verification:
         asked = read_problem(self.problem)
         rows = read_trajectory(self.trajectory, asked.manipulator)
-        return verify(asked, rows, load_robot(asked.manipulator), errors=errors)
+        robot, box = load_robot(asked.manipulator), errors or ErrorBox()
+        return verify(asked.under(box), rows, robot)
 
     def check(self, found: Verification) -> Outcome:
         named = read_problem(self.problem).sha256, sha256(self.trajectory.read_bytes())
@@ -434,7 +435,7 @@ def judge_random(seed: int, folder: Path) -> Verdict:
         box = ErrorBox(joint=1e-4, base=1e-4, base_turn=1e-4)
         proof = prove_clearance(asked, rows, box)
         if not proof.counts[:, 1:].any():
-            outcome = files.check(replace(found, errors=box))
+            outcome = files.check(replace(found, problem=asked.under(box)))
             assert outcome.accepted, (seed, outcome.reason)
     return found.verdict
 

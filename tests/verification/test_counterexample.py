@@ -192,7 +192,7 @@ def test_the_row_says_refuted_and_the_nominal_motion_needs_no_counterexample() -
         (ErrorBox(joint=0.0001), Verdict.CERTIFIED, 0),
         (ErrorBox(joint=0.01), Verdict.REFUTED, 1),
     ):
-        found = verify(problem, rows, robot, errors=box)
+        found = verify(problem.under(box), rows, robot)
         row = next(c for c in found.checks if c.name == "clearance from obstacles")
         assert row.verdict is verdict
         assert len(found.counterexamples) == count
@@ -200,7 +200,7 @@ def test_the_row_says_refuted_and_the_nominal_motion_needs_no_counterexample() -
     assert row.where.endswith("within the error box; the nominal motion is clear")
     assert found.nominal_clear
     touching = replace(problem, required_clearance=0.06)
-    found = verify(touching, rows, robot, errors=ErrorBox(joint=0.01))
+    found = verify(touching.under(ErrorBox(joint=0.01)), rows, robot)
     assert found.counterexamples == ()
     assert found.verdict is Verdict.REFUTED
     assert not found.nominal_clear
@@ -215,7 +215,7 @@ def test_the_nominal_motion_is_called_clear_only_where_all_of_it_is_proved() -> 
         if not clear:
             corners += [0.0, 0.0, 2.0]
         sheets = Mesh("sheets", corners, np.array([[0, 1, 2], [3, 4, 5]]))
-        found = verify(problem_with(ceiling(0.05), sheets), rows, robot, errors=box)
+        found = verify(problem_with(ceiling(0.05), sheets).under(box), rows, robot)
         assert len(found.counterexamples) == 1
         assert found.nominal_clear is clear
         row = next(c for c in found.checks if c.name == "clearance from obstacles")

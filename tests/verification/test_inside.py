@@ -40,6 +40,7 @@ from vdsm_pin.verification.verify import verify
 
 RADIUS = 0.002
 STEP = 0.001
+NO_ERRORS = ErrorBox()
 
 
 def obj(corners: FloatArray) -> str:
@@ -81,9 +82,9 @@ def written(
 
 
 def verified(
-    problem: Path, rows: Path, **more: Any
+    problem: Path, rows: Path, errors: ErrorBox = NO_ERRORS, **more: Any
 ) -> tuple[PlanningProblem, Verification]:
-    file = read_problem(problem)
+    file = read_problem(problem).under(errors)
     arm = file.manipulator
     found = verify(file, read_trajectory(rows, arm), load_robot(arm), **more)
     return file, found

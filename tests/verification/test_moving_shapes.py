@@ -17,6 +17,7 @@ from vdsm_pin.verification.records import Check, Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
+NONE = ErrorBox()
 HEAD = """
 vdsm_problem: 1
 name: shapes
@@ -78,7 +79,7 @@ def judged(
     joint_error: bool = True,
 ) -> Verification:
     robot = load_robot(problem.manipulator)
-    return verify(problem, motion, robot, errors=errors, joint_error=joint_error)
+    return verify(problem.under(errors or NONE), motion, robot, joint_error=joint_error)
 
 
 def clearance(found: Verification) -> Check:

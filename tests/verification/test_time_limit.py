@@ -51,11 +51,10 @@ def case(required: float = 0.0035, n: int = 400) -> tuple[PlanningProblem, Traje
 def judged(deadline: Deadline) -> Verification:
     problem, rows = case()
     return verify(
-        problem,
+        problem.under(ErrorBox(joint=1e-4)),
         rows,
         load_robot(problem.manipulator),
         joint_error=True,
-        errors=ErrorBox(joint=1e-4),
         sinks=[lambda chunk: None],
         deadline=deadline,
     )

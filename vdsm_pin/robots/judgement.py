@@ -121,7 +121,6 @@ def verify_robot(
     return RobotVerification(
         problem=cell,
         trajectory=path,
-        errors=cell.errors,
         pairs=named,
         checks=tuple(checks),
         approaches=approaches,

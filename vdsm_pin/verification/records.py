@@ -205,7 +205,6 @@ class Verification(Summarised):
     Args:
         problem: Arm or robot, scene and required clearances.
         trajectory: The motion that was judged.
-        errors: The error box the clearance proof covers.
         pairs: Every pair judged, in the order that chunks number them.
         checks: One row per check, in a fixed order.
         approaches: The closest approaches over the whole motion, nearest first, one per
@@ -228,7 +227,6 @@ class Verification(Summarised):
 
     problem: AnyProblem
     trajectory: AnyMotion
-    errors: ErrorBox
     pairs: tuple[Pair, ...]
     checks: tuple[Check, ...]
     approaches: tuple[ClosestApproach, ...]
@@ -241,6 +239,11 @@ class Verification(Summarised):
     not_done: tuple[str, ...] = ()
     time_limit: float = float("inf")
     coal: CoalRows | None = None
+
+    @property
+    def errors(self) -> ErrorBox:
+        """The error box that the clearance proof covers."""
+        return self.problem.errors
 
     @property
     def verdict(self) -> Verdict:

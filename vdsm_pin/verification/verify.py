@@ -69,7 +69,6 @@ def verify(
     trajectory: Trajectory,
     robot: RobotModel,
     *,
-    errors: ErrorBox | None = None,
     sinks: Sequence[ClearanceSink] = (),
     joint_error: bool = False,
     deadline: Deadline = NO_LIMIT,
@@ -79,11 +78,10 @@ def verify(
     """Judge a trajectory against a problem.
 
     Args:
-        problem: What is asked.
+        problem: What is asked; the clearance proof covers every motion within its
+            errors.
         trajectory: What is judged, whoever made it.
         robot: The arm in Pinocchio and Coal.
-        errors: The clearance proof covers every motion within this box and within the
-            errors of the problem.
         sinks: Receive the clearance brackets in chunks, in order.
         joint_error: Whether to find the largest joint error that is still certified.
         deadline: When to give up what is left.
@@ -97,14 +95,14 @@ def verify(
         an undecided row.
 
     Raises:
-        InvalidInput: If the trajectory is of another arm or the errors are negative.
+        InvalidInput: If the trajectory is of another arm.
     """
-    box = problem.errors.widened(errors or ErrorBox())
-    _check_input(problem, trajectory, box)
+    _check_input(problem, trajectory)
+    box = problem.errors
     reach = coal_reach(problem) if reach is None else reach
     located = locate_arm(problem, trajectory, box, deadline)
     enclosed = bodies_inside(problem, trajectory, arm_inside(located))
-    judgement = _Judgement(problem, trajectory, box, deadline)
+    judgement = _Judgement(problem, trajectory, deadline)
     inside = pairs_inside(problem, all_pairs(problem), enclosed)
     proved = judgement.proved(inside, sinks, reach)
     proof = proved.proof
@@ -144,7 +142,6 @@ def verify(
     return ArmVerification(
         problem=problem,
         trajectory=trajectory,
-        errors=box,
         pairs=proof.pairs,
         checks=tuple(checks),
         approaches=tuple(log.approaches),
@@ -184,7 +181,6 @@ class _Judgement:
     Args:
         problem: Arm, scene, required clearances.
         trajectory: The motion.
-        errors: The error box that the proof covers.
         deadline: When to give up what is left.
     """
 
@@ -192,11 +188,10 @@ class _Judgement:
         self,
         problem: PlanningProblem,
         trajectory: Trajectory,
-        errors: ErrorBox,
         deadline: Deadline,
     ) -> None:
         self.problem, self.trajectory = problem, trajectory
-        self.errors, self.deadline, self.extras = errors, deadline, BestEffort()
+        self.deadline, self.extras = deadline, BestEffort()
 
     def proved(
         self, inside: Mapping[int, Inside], sinks: Sequence[ClearanceSink], reach: float
@@ -212,7 +207,7 @@ class _Judgement:
         proof = prove_clearance(
             problem,
             trajectory,
-            self.errors,
+            self.problem.errors,
             wanted,
             deadline=self.deadline,
             reach=math.inf if inside else reach,
@@ -223,7 +218,7 @@ class _Judgement:
 
     def counterexamples(self, proof: ClearanceProof) -> tuple[Counterexample, ...]:
         """Motions within the errors that come too close."""
-        motion = self.problem, self.trajectory, self.errors
+        motion = self.problem, self.trajectory, self.problem.errors
         name, asked = "search for counterexamples", (*motion, proof, self.deadline)
         return self.extras.take(name, (), find_counterexamples, *asked)
 
@@ -241,7 +236,7 @@ class _Judgement:
 
     def contacts(self, proved: _Proved) -> tuple[FirstContact, ...]:
         """When pairs first come too close."""
-        motion = self.problem, self.trajectory, self.errors
+        motion = self.problem, self.trajectory, self.problem.errors
         asked = *motion, proved.proof, self.deadline, proved.too_close
         return self.extras.take("first contact", (), arm_contacts, *asked)
 
@@ -272,7 +267,7 @@ class _Judgement:
         """
         if any(where.side is not Side.OUTSIDE for where in located.values()):
             return 0.0, nan
-        problem, motion, errors = self.problem, self.trajectory, self.errors
+        problem, motion, errors = self.problem, self.trajectory, self.problem.errors
         hulls, hulled = unlocated(locate_start(problem, motion)), problem
         if hulls:  # else with what the problem keeps packed
             hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
@@ -289,9 +284,7 @@ class _Judgement:
         return largest, take(name, nan, refuted_joint_error, *more)
 
 
-def _check_input(
-    problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
-) -> None:
+def _check_input(problem: PlanningProblem, trajectory: Trajectory) -> None:
     expected, found = problem.manipulator.n_links, trajectory.n_links
     if expected != found:
         message = f"trajectory has {found} links, the problem's arm has {expected}"
@@ -299,4 +292,4 @@ def _check_input(
     check_timed(problem.scene, trajectory)
     for pair in problem.manipulator.ignore_pairs:
         problem.manipulator.check_ignored(pair, problem.scene.names)
-    problem.check_errors(errors)
+    problem.check_errors(problem.errors)

@@ -124,7 +124,7 @@ def hold_to_account(task: PlanningProblem) -> None:
     assert told is not None
     assert float(told[1]) == pytest.approx(np.rad2deg(error), abs=6e-4)
     below = ErrorBox(joint=error - TOLERANCES.joint_error)
-    result = verify(task, plan.trajectory, robot, errors=below)
+    result = verify(task.under(below), plan.trajectory, robot)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
     above = verify(
@@ -134,7 +134,7 @@ def hold_to_account(task: PlanningProblem) -> None:
     lost = re.search(r"start itself does not survive (\S+) deg", plan.notes[-1])
     if lost is not None:
         box = ErrorBox(joint=np.deg2rad(float(lost[1]) + 1e-3))
-        alone = verify(task, plan.trajectory.part(0, 1), robot, errors=box)
+        alone = verify(task.under(box), plan.trajectory.part(0, 1), robot)
         assert alone.counterexamples  # a configuration within the box that is too near
 
 
