@@ -1,6 +1,5 @@
 """PCD, the format of the Point Cloud Library: text, binary, binary and compressed."""
 
-import io
 import math
 from contextlib import suppress
 from dataclasses import dataclass
@@ -125,9 +124,9 @@ def _text(stream: MeshStream, header: _Header, data: bytes) -> FloatArray:
     lines = data.decode("latin-1").rstrip().splitlines()
     _check_size(stream, header, len(lines), header.points)
     with suppress(ValueError):  # told line by line below
-        if {len(line.split()) for line in lines} == {starts[-1]}:
-            text = io.StringIO("\n".join(lines))
-            return np.loadtxt(text, usecols=place, ndmin=2, comments=None)
+        table = np.loadtxt(lines, ndmin=2, comments=None)
+        if table.shape == (header.points, starts[-1]):
+            return table[:, place]
     rows = []
     for number, line in enumerate(lines, header.lines + 1):
         words = line.split()
