@@ -40,7 +40,6 @@ class Mesh(FromFile):
     """Triangles, and the inside of the closed surface that they make.
 
     Args:
-        name: Unique name.
         vertices: Shape (n, 3), in the base frame; [m].
         triangles: Vertex indices, shape (m, 3), m >= 1.
         solid: Whether the problem says that there is an inside; None where it leaves
@@ -133,7 +132,6 @@ class PointCloud(FromFile):
     """Measured points, each a ball of the scan's error.
 
     Args:
-        name: Unique name.
         points: Shape (n, 3), n >= 1; [m].
         radius: Of the balls; [m].
     """
@@ -164,7 +162,6 @@ class Voxels(FromFile):
     """Occupied cells of a grid, each a cuboid; they need not touch.
 
     Args:
-        name: Unique name.
         centres: Shape (n, 3), n >= 1; [m].
         rotation: R_base_grid, shape (3, 3); [-].
         half_size: Half the edge lengths of a cell, shape (3,); [m].

@@ -108,7 +108,6 @@ class Sphere(NamedSolid):
     """A ball.
 
     Args:
-        name: Unique name.
         centre: Shape (3,); [m].
         radius: [m].
     """
@@ -156,7 +155,6 @@ class Capsule(_Axial):
     """A segment grown by a radius.
 
     Args:
-        name: Unique name.
         centre: Shape (3,); [m].
         axis: Unit vector, shape (3,); [-].
         half_length: Half the distance between the centres of its ends; [m].
@@ -173,7 +171,6 @@ class Cylinder(_Axial):
     """A cylinder with flat ends.
 
     Args:
-        name: Unique name.
         centre: Shape (3,); [m].
         axis: Unit vector, shape (3,); [-].
         half_length: Half the height; [m].
@@ -191,7 +188,6 @@ class Box(NamedSolid):
     """A cuboid.
 
     Args:
-        name: Unique name.
         centre: Shape (3,); [m].
         rotation: R_base_box, shape (3, 3); [-].
         half_size: Half the edge lengths, shape (3,); [m].
@@ -219,7 +215,6 @@ class Prism(NamedSolid):
     """A simple polygon swept along its normal.
 
     Args:
-        name: Unique name.
         origin: Origin of the section frame, shape (3,); [m].
         rotation: R_base_section, shape (3, 3): columns are the section's two in-plane
             axes and the sweep axis; [-].
@@ -285,7 +280,6 @@ class HalfSpace(NamedSolid):
     """Everything on one side of a plane: (p - point) . normal <= 0.
 
     Args:
-        name: Unique name.
         point: A point of the plane, shape (3,); [m].
         normal: Unit vector out of the solid, shape (3,); [-].
     """
