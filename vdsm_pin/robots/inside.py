@@ -107,8 +107,10 @@ def question_of_hulls(
 def at_start(cell: Cell, path: Path) -> dict[int, Place]:
     """Where each link begins as seen from each mesh, by the number of their pair."""
     solids = [solid_of(one) for one in cell.scene.obstacles]
-    n, poses = len(cell.robot.bodies), cell.poses(path.knots[:1])[0]
     found = dict[int, Place]()
+    if not any(isinstance(one, Mesh) for one in solids):
+        return found
+    n, poses = len(cell.robot.bodies), cell.poses(path.knots[:1])[0]
     for k, pair in enumerate(cell.pairs):
         mesh = solids[pair.one - n] if pair.one >= n else None
         if isinstance(mesh, Mesh) and not mesh.is_surface:

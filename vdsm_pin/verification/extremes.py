@@ -108,6 +108,9 @@ def _with_pieces(
 ) -> Largest:
     """The largest value, some pieces included."""
     start, width = first + np.arange(float(len(controls))), 1.0
+    if controls.shape[1] == 1:  # rows, between which nothing is larger
+        values = measure(controls[:, 0]).reshape(len(start), -1)
+        return found.larger(values, start).bounded(values)
     for cut in range(MOST_CUTS + 1):
         values = measure(controls.reshape(-1, controls.shape[2]))
         values = values.reshape(*controls.shape[:2], -1)
