@@ -18,6 +18,7 @@ from benchmarks.foreign_plans.problems import ARMS, ROBOTS, Problem, problems, s
 from benchmarks.foreign_plans.sampled import Sampled
 from benchmarks.foreign_plans.summary import document
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.urdf import read_robot
 
@@ -37,7 +38,7 @@ def outcomes(
     """
     folder = source(name)
     urdf, srdf = folder / f"{name}.urdf", folder / f"{name}.srdf"
-    robot = read_robot(urdf, srdf, group=ARMS[name])
+    robot = read_robot(RobotFiles(urdf, srdf, group=ARMS[name]))
     with tempfile.TemporaryDirectory() as aside:
         for problem in problems(name, per_set, Path(aside)):
             sampled = Sampled(name, problem.scene)

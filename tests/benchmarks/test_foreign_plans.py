@@ -15,6 +15,7 @@ from benchmarks.foreign_plans.run import outcomes
 from benchmarks.foreign_plans.sampled import Sampled
 from benchmarks.foreign_plans.summary import document
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.records import Verdict
@@ -104,7 +105,7 @@ def test_false_verdicts_are_faults(folder: Path, tmp_path: Path) -> None:
     )
     assert "0.1" in _fault(sampled, through, Verdict.REFUTED, hit=False, near=1e-4)
     files = folder / "panda/panda.urdf", folder / "panda/panda.srdf"
-    robot = read_robot(*files, group="panda_arm")
+    robot = read_robot(RobotFiles(*files, group="panda_arm"))
     plan = Plan("panda", "post", 1, 0.01, through.tolist())
     found = judge(plan, sampled, robot, read_scene(problem.scene, 1.0))
     assert not found.fault

@@ -23,7 +23,7 @@ from vdsm_pin.certificate_checker.robot import Model, within
 from vdsm_pin.certificate_checker.tree import Tree
 from vdsm_pin.cli import main
 from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.urdf import read_robot, robot_of
+from vdsm_pin.robots.urdf import read_robot
 
 Rng = np.random.Generator
 
@@ -235,7 +235,7 @@ def test_numbers_changed_at_random_are_refused_or_true(tmp_path: Path) -> None:
 
 def assert_read_alike(files: RobotFiles, rng: Rng) -> None:
     """The checker's tree stands as the package's, which Pinocchio's agrees with."""
-    robot = robot_of(files)
+    robot = read_robot(files)
     joints = Model(files, np.eye(4))
     assert joints.moved == list(robot.joints)
     rows = rng.uniform(-2.0, 2.0, (3, len(robot.joints)))
@@ -262,7 +262,7 @@ def judged_at_random(folder: Path, seed: int) -> bool:
     asked = {"urdf": "r.urdf"} | ({"srdf": "all.srdf"} if rng.random() < 0.5 else {})
     asked |= {"bodies": str(rng.choice(["hull", "parts", "primitives"]))}
     srdf = folder / "all.srdf" if "srdf" in asked else None
-    robot = read_robot(folder / "r.urdf", srdf)
+    robot = read_robot(RobotFiles(folder / "r.urdf", srdf))
     locked = [joint.name for joint in robot.joints if rng.random() < 0.15]
     lock = {name: float(rng.uniform(-0.5, 0.5)) for name in locked}
     assert_read_alike(RobotFiles(folder / "r.urdf", srdf, (), lock), rng)

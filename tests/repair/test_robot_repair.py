@@ -18,6 +18,7 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.trajectory_files import read_path
@@ -50,7 +51,7 @@ def asked(folder: Path, *balls: tuple[float, float, float]) -> Cell:
         Sphere(f"ball{k}", np.array([x, y, 0.0]), r)
         for k, (x, y, r) in enumerate(balls)
     ]
-    return Cell(read_robot(file), Scene(tuple(solids)), 1e-3)
+    return Cell(read_robot(RobotFiles(file)), Scene(tuple(solids)), 1e-3)
 
 
 def tip_at(a: float, b: float) -> tuple[float, float]:

@@ -45,9 +45,9 @@ def names(robot: Robot) -> list[str]:
 
 def test_a_group_says_which_joints_move(tmp_path: Path, urdf: Path) -> None:
     srdf = write(tmp_path, "two.srdf", SRDF)
-    assert names(read_robot(urdf, srdf, group="arm")) == ["turn", "slide"]
-    assert names(read_robot(urdf, srdf, group="both")) == ["turn", "slide"]
-    robot = read_robot(urdf, srdf, group="first", lock={"slide": 0.3})
+    assert names(read_robot(RobotFiles(urdf, srdf, group="arm"))) == ["turn", "slide"]
+    assert names(read_robot(RobotFiles(urdf, srdf, group="both"))) == ["turn", "slide"]
+    robot = read_robot(RobotFiles(urdf, srdf, group="first", lock={"slide": 0.3}))
     assert names(robot) == ["turn"]
     assert "joint 'slide' is locked at 0.3" in robot.notes
     assert "joint 'cart/x' is no part of the group and stands at 0" in robot.notes
@@ -59,12 +59,12 @@ def test_a_group_says_which_joints_move(tmp_path: Path, urdf: Path) -> None:
         ("up", "no chain leads from 'hand' to 'base'"),
     ):
         with pytest.raises(InvalidFile, match=expected):
-            read_robot(urdf, srdf, group=group)
+            read_robot(RobotFiles(urdf, srdf, group=group))
     with pytest.raises(InvalidInput, match="needs a SRDF"):
-        read_robot(urdf, group="arm")
+        read_robot(RobotFiles(urdf, group="arm"))
     away = URDF.replace('lower="-0.1"', 'lower="0.1"')
     with pytest.raises(InvalidFile, match=r"stands at 0, outside .* 0\.1 to 0\.4"):
-        read_robot(write(tmp_path, "away.urdf", away), srdf, group="first")
+        read_robot(RobotFiles(write(tmp_path, "away.urdf", away), srdf, group="first"))
 
 
 @pytest.mark.parametrize("kind", ["planar", "floating"])
@@ -76,40 +76,40 @@ def test_what_floats_stands_where_pinocchio_has_it(tmp_path: Path, kind: str) ->
         'joint="slide"', 'joint="turn"'
     )
     urdf = write(tmp_path, "two.urdf", text)
-    robot = read_robot(urdf, srdf)
+    robot = read_robot(RobotFiles(urdf, srdf))
     count = {"planar": 3, "floating": 6}[kind]
     assert len(robot.joints) == 2 * count + 1
     q = np.random.default_rng(2).uniform(-3.0, 3.0, (50, len(robot.joints)))
     assert pose_difference(robot, q).max() < 1e-12
-    still = read_robot(urdf, srdf, lock={"cart": 0.0, "slide/x": 0.3})
+    still = read_robot(RobotFiles(urdf, srdf, lock={"cart": 0.0, "slide/x": 0.3}))
     assert names(still)[0] == "turn"
     assert pose_difference(still, q[:, : len(still.joints)]).max() < 1e-12
     with pytest.raises(InvalidFile, match="'cart' has several values; lock cart/x"):
-        read_robot(urdf, srdf, lock={"cart": 1.0})
+        read_robot(RobotFiles(urdf, srdf, lock={"cart": 1.0}))
 
 
 def test_prefixes_that_nothing_declares_are_read_as_ros_does(tmp_path: Path) -> None:
     """As in URDFs for Drake; `document.iter` sees them, Pinocchio the same joints."""
     text = URDF.replace("<limit ", '<limit drake:acceleration="2.5" ', 1)
     assert text != URDF
-    robot = read_robot(write(tmp_path, "drake.urdf", text))
+    robot = read_robot(RobotFiles(write(tmp_path, "drake.urdf", text)))
     assert robot.notes == ("what is of these namespaces is not read: 'drake'",)
     assert pose_difference(robot, np.array([[0.7, 0.1]])).max() < 1e-12
     declared = text.replace("<robot ", '<robot xmlns:drake="http://drake.mit.edu" ', 1)
-    (note,) = read_robot(write(tmp_path, "declared.urdf", declared)).notes
+    (note,) = read_robot(RobotFiles(write(tmp_path, "declared.urdf", declared))).notes
     assert "http://drake.mit.edu" in note
 
 
 def test_limits_that_are_not_stated_are_noted(tmp_path: Path, urdf: Path) -> None:
     limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
     free = write(tmp_path, "free.urdf", URDF.replace(limit, "", 1))
-    robot = read_robot(free)
+    robot = read_robot(RobotFiles(free))
     assert robot.joints[0].upper == np.inf
     note = "joint 'turn' states no limits, and none of its own are checked"
     assert robot.notes == (note,)
     assert pose_difference(robot, np.array([[0.7, 0.1]])).max() < 1e-12
     limits = write(tmp_path, "joint_limits.yaml", LIMITS)
-    turn, slide = read_robot(urdf, joint_limits=limits).joints
+    turn, slide = read_robot(RobotFiles(urdf, joint_limits=limits)).joints
     assert (turn.velocity, turn.acceleration, turn.upper) == (0.5, np.inf, 3.0)
     assert (slide.velocity, slide.acceleration) == (0.5, 2.0)  # of what mimics it
     assert (slide.lower, slide.upper) == (-0.1, 0.2)
@@ -128,7 +128,7 @@ def test_pinocchio_reads_joints_alone(
     """Its reader complains of a capsule, and takes no joint without limits."""
     limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
     text = URDF.replace("sphere", 'capsule length="0.1"').replace(limit, "<limit/>")
-    robot = read_robot(write(tmp_path, "two.urdf", text))
+    robot = read_robot(RobotFiles(write(tmp_path, "two.urdf", text)))
     assert pose_difference(robot, np.array([[0.7, 0.1]])).max() < 1e-12
     assert capfd.readouterr() == ("", "")
 
@@ -140,7 +140,7 @@ def test_links_that_are_seen_alone_are_noted(tmp_path: Path) -> None:
         '<link name="arm"><collision_checking><capsule name="c"/></collision_checking>'
     )
     text = text.replace('<link name="arm">', odd)
-    notes = read_robot(write(tmp_path, "seen.urdf", text)).notes
+    notes = read_robot(RobotFiles(write(tmp_path, "seen.urdf", text))).notes
     assert notes == (
         "links without a collision solid are not judged: 'finger'",
         "Pinocchio's collision_checking is not read; cylinders have flat ends: 'arm'",
@@ -151,7 +151,7 @@ def test_parts_of_a_joint_have_names_of_their_own(tmp_path: Path) -> None:
     text = URDF.replace('name="turn" type="revolute"', 'name="a" type="planar"')
     text = text.replace("0 0 2", "0 0 1").replace('"slide"', '"a/x"')
     with pytest.raises(InvalidFile, match="two joints have the value 'a/x'"):
-        read_robot(write(tmp_path, "two.urdf", text))
+        read_robot(RobotFiles(write(tmp_path, "two.urdf", text)))
 
 
 def octahedron(folder: Path) -> Path:
@@ -178,7 +178,7 @@ def test_covers_of_a_mesh_hold_all_of_it(tmp_path: Path) -> None:
     points += np.array([1.0, 0.0, 0.0])
     far = []
     for solids in (MeshCover(), MeshCover("parts", 2), MeshCover("primitives")):
-        robot = read_robot(urdf, solids=solids)
+        robot = read_robot(RobotFiles(urdf, solids=solids))
         (arm,) = [body for body in robot.bodies if body.name == "arm"]
         ends = np.repeat(points[:, None], 2, axis=1)
         none = np.zeros(len(points), np.int64)
@@ -209,7 +209,7 @@ def test_a_capsule_is_its_closed_form(tmp_path: Path) -> None:
     text = URDF.replace('<sphere radius="0.1"/>', '<capsule radius="0.1" length="2"/>')
     (arm,) = [
         body
-        for body in read_robot(write(tmp_path, "c.urdf", text)).bodies
+        for body in read_robot(RobotFiles(write(tmp_path, "c.urdf", text))).bodies
         if body.name == "arm"
     ]
     point = np.array([[[1.0, 0.0, 1.5]] * 2])
@@ -224,13 +224,13 @@ def test_xacro_is_expanded(tmp_path: Path) -> None:
     head = '<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">'
     head += '<xacro:property name="size" value="${0.05 * 2}"/>'
     text = URDF.replace('<robot name="two">', head).replace('"0.1"', '"${size}"')
-    robot = read_robot(write(tmp_path, "two.urdf.xacro", text))
-    plain = read_robot(write(tmp_path, "two.urdf", URDF))
+    robot = read_robot(RobotFiles(write(tmp_path, "two.urdf.xacro", text)))
+    plain = read_robot(RobotFiles(write(tmp_path, "two.urdf", URDF)))
     q = np.array([[0.3, 0.1]])
     np.testing.assert_array_equal(robot.tree.poses(q), plain.tree.poses(q))
     for bad in (text.replace("0.05 *", "length *"), text[:300]):
         with pytest.raises(InvalidFile, match="is not expanded by xacrodoc"):
-            read_robot(write(tmp_path, "two.urdf.xacro", bad))
+            read_robot(RobotFiles(write(tmp_path, "two.urdf.xacro", bad)))
 
 
 def test_what_a_xacro_includes_is_in_its_hash(tmp_path: Path) -> None:
@@ -265,7 +265,7 @@ def test_damaged_semantics_never_end_in_a_traceback(tmp_path: Path, urdf: Path) 
         limits = write(tmp_path, "limits.yaml", mutated(LIMITS, rng))
         for files in ({"srdf": srdf, "group": "both"}, {"joint_limits": limits}):
             try:
-                read_robot(urdf, **files)  # type: ignore[arg-type]
+                read_robot(RobotFiles(urdf, **files))  # type: ignore[arg-type]
             except VdsmError as error:
                 refused += 1
                 assert len(str(error).splitlines()) == 1

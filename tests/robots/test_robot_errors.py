@@ -22,6 +22,7 @@ from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.errors import proof_box
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.urdf import read_robot
@@ -74,7 +75,7 @@ obstacles:
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     urdf = tmp_path_factory.mktemp("robot") / "two.urdf"
     urdf.write_text(URDF)
-    return read_robot(urdf)
+    return read_robot(RobotFiles(urdf))
 
 
 def random_cell(robot: Robot, rng: np.random.Generator) -> tuple[Cell, Motion]:

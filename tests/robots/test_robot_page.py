@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from vdsm_pin.cli import app
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.hulls import hull_triangles
 from vdsm_pin.robots.urdf import read_robot
 
@@ -72,7 +73,7 @@ def test_the_page_moves_the_links_as_the_tree_does(out: Path) -> None:
     """Corners drawn at every moment told are corners of the link where it stands."""
     page = (out / "report.html").read_text()
     data = page_data(page)
-    robot = read_robot(out.parent / "r.urdf")
+    robot = read_robot(RobotFiles(out.parent / "r.urdf"))
     motion, links = data["motion"], data["scene"]["links"]
     assert [link["name"] for link in links] == ["foot", "<arm>", "tool"]
     assert "<arm>" not in page.split('id="data"')[0]
@@ -166,7 +167,7 @@ def test_a_counterexample_is_told_by_joint_and_drawn_as_a_ghost(
     (ghost,) = data["scene"]["ghosts"]
     assert ghost["moment"] == lost["moment"]
     assert ghost["words"][0].endswith("tool comes too near post")
-    robot = read_robot(tmp_path / "r.urdf")
+    robot = read_robot(RobotFiles(tmp_path / "r.urdf"))
     q = np.array([[turn["value_rad"], lift["value_m"]]])
     tool = robot.poses(q)[0, robot.frames["tool"]] @ [0.0, 0.0, -0.1, 1.0]
     np.testing.assert_allclose(ghost["centres"][2], tool[:3], atol=1e-12)

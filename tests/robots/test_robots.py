@@ -73,7 +73,7 @@ def write(folder: Path, name: str, text: str) -> Path:
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Robot:
-    return read_robot(write(tmp_path, "two.urdf", URDF))
+    return read_robot(RobotFiles(write(tmp_path, "two.urdf", URDF)))
 
 
 def test_poses_are_pinocchios(robot: Robot) -> None:
@@ -132,7 +132,7 @@ def test_a_robot_of_which_nothing_moves_is_judged_where_it_stands(
     """The ball on the arm, locked at a right angle, is 150 mm from the other."""
     urdf = write(tmp_path, "two.urdf", URDF)
     lock = {"turn": np.pi / 2, "slide": 0.0}
-    robot = read_robot(urdf, lock=lock)
+    robot = read_robot(RobotFiles(urdf, lock=lock))
     path = read_path(write(tmp_path, "t.csv", "time_s\n0\n1\n"), robot)
     scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
     for required, verdict in ((0.149, "certified"), (0.151, "refuted")):
@@ -271,7 +271,7 @@ def test_a_joint_is_held_to_the_limits_of_what_mimics_it(
     """Follow = 2 slide + 0.1, at 1 rad/s; limits that leave no room do not count."""
     head, tail = URDF.split('offset="0.1"/>')
     text = head + 'offset="0.1"/>' + tail.replace('lower="-3" upper="3"', follower)
-    robot = read_robot(write(tmp_path, "two.urdf", text))
+    robot = read_robot(RobotFiles(write(tmp_path, "two.urdf", text)))
     slide = robot.joints[1]
     assert (slide.lower, slide.upper, slide.velocity) == pytest.approx(limits)
     rows = "turn_rad,slide_m,time_s\n0,0.1,0\n0.2,0.3,1\n"
@@ -300,7 +300,7 @@ def test_limits_of_a_mimic_that_cannot_be_kept_are_noted(
 ) -> None:
     """As of a gripper whose fingers turn against each other with the same limits."""
     text = URDF.replace('multiplier="2" offset="0.1"', change)
-    robot = read_robot(write(tmp_path, "two.urdf", text), lock=lock)
+    robot = read_robot(RobotFiles(write(tmp_path, "two.urdf", text), lock=lock))
     found = [note for note in robot.notes if "limits of joint 'follow'" in note]
     assert len(found) == bool(why)
     assert all(f"-3 to 3, are not judged: {why}" in note for note in found)
@@ -337,18 +337,18 @@ def test_planning_scenes_are_whole_and_in_one_frame(tmp_path: Path) -> None:
 
 def test_pairs_follow_the_srdf(tmp_path: Path) -> None:
     urdf = write(tmp_path, "two.urdf", URDF)
-    assert [one.reason for one in read_robot(urdf).left_out] == [
+    assert [one.reason for one in read_robot(RobotFiles(urdf)).left_out] == [
         "neighbours, joined by one joint",
         "neighbours, joined by one joint",
     ]
     entry = '<disable_collisions link1="arm" link2="base" reason="Adjacent"/>'
     srdf = write(tmp_path, "two.srdf", f"<robot>{entry}</robot>")
-    robot = read_robot(urdf, srdf)
+    robot = read_robot(RobotFiles(urdf, srdf))
     assert len(robot.held) == 2
     assert robot.left_out[0].reason == "left out by the SRDF: Adjacent"
     write(tmp_path, "two.srdf", f"<robot>{entry.replace('arm', 'leg')}</robot>")
     with pytest.raises(InvalidFile, match="'leg', which is no link"):
-        read_robot(urdf, srdf)
+        read_robot(RobotFiles(urdf, srdf))
 
 
 BAD = [
@@ -376,7 +376,7 @@ def test_odd_robots_are_refused_in_a_sentence(
 ) -> None:
     path = write(tmp_path, "bad.urdf", URDF.replace(old, new, 1))
     with pytest.raises(InvalidFile) as caught:
-        read_robot(path)
+        read_robot(RobotFiles(path))
     assert expected in str(caught.value)
 
 
@@ -418,7 +418,7 @@ def test_damaged_files_never_end_in_a_traceback(tmp_path: Path, robot: Robot) ->
     write(tmp_path, "two.urdf", URDF)
     readers: list[tuple[str, str, Callable[[Path], object]]] = [
         ("cell.yaml", cell, read_cell),
-        ("a.urdf", URDF, read_robot),
+        ("a.urdf", URDF, lambda file: read_robot(RobotFiles(file))),
         ("s.yaml", SCENE, lambda path: read_scene(path, 1.0)),
         ("m.yaml", MOVEIT, lambda path: read_scene(path, 1.0)),
         ("t.csv", ROWS, lambda path: read_path(path, robot)),

@@ -21,6 +21,7 @@ from vdsm_pin.io.trajectory_messages import of_message, text_of
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.rates import rate_checks
 from vdsm_pin.robots.trajectory_csv import csv_text
@@ -38,7 +39,7 @@ def urdf(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def robot(urdf: Path) -> Robot:
-    return read_robot(urdf)
+    return read_robot(RobotFiles(urdf))
 
 
 def motion(smooth: int, rows: int = 5) -> JointTrajectory:
@@ -146,7 +147,7 @@ def test_joints_of_several_degrees_turn_about_z(tmp_path: Path) -> None:
     text = URDF.replace('type="prismatic"', 'type="planar"')
     text = text.replace('<axis xyz="0 1 0"/>', "")
     text = text.replace('joint="slide"', 'joint="turn"')
-    robot = read_robot(write(tmp_path, "planar.urdf", text))
+    robot = read_robot(RobotFiles(write(tmp_path, "planar.urdf", text)))
     angles = [3.0, 3.3]
     message = {
         "joint_trajectory": {
@@ -370,9 +371,9 @@ def test_joints_that_stand_still_are_not_moved(
     tmp_path: Path, urdf: Path, ending: str
 ) -> None:
     """Where the file moves a joint that is held, its motion is not what is judged."""
-    whole, given = read_robot(urdf), motion(0)
+    whole, given = read_robot(RobotFiles(urdf)), motion(0)
     held = float(given.q[0, 1])
-    robot = read_robot(urdf, lock={"slide": held})
+    robot = read_robot(RobotFiles(urdf, lock={"slide": held}))
     file = written(tmp_path, ending, given, whole)
     with pytest.raises(InvalidFile, match=r"'slide' at .* stands still and is judged"):
         read_motion(file, robot.joints, values=robot.values)
@@ -425,7 +426,7 @@ def test_what_is_not_read_is_noted(tmp_path: Path, robot: Robot) -> None:
 def test_a_joint_that_goes_the_long_way_round_is_noted(tmp_path: Path) -> None:
     """One without limits; half a turn, or one between limits, is as it must be."""
     free = URDF.replace('type="revolute"', 'type="continuous"', 1)
-    robot = read_robot(write(tmp_path, "free.urdf", free))
+    robot = read_robot(RobotFiles(write(tmp_path, "free.urdf", free)))
     for values, words in (
         ((0, 3, -3, -2), "344 deg between waypoints 1 and 2: judged as it stands"),
         (
@@ -447,7 +448,7 @@ def test_a_joint_that_goes_the_long_way_round_is_noted(tmp_path: Path) -> None:
     again = write(tmp_path, "again.csv", csv_text(many, robot))
     np.testing.assert_allclose(read_path(again, robot).knots, many.q, rtol=1e-15)
     file = write(tmp_path, "t.csv", "turn_rad,slide_m\n3,0\n-3,0\n")
-    limited = read_robot(write(tmp_path, "two.urdf", URDF))
+    limited = read_robot(RobotFiles(write(tmp_path, "two.urdf", URDF)))
     assert read_motion(file, limited.joints, values=limited.values).notes == ()
 
 
@@ -460,7 +461,7 @@ def test_a_joint_has_one_column(tmp_path: Path, robot: Robot) -> None:
 def test_names_with_signs_of_csv_are_read_back(tmp_path: Path) -> None:
     name = "a;b, 'c' &quot;d&quot;"
     text = URDF.replace('"turn"', f'"{name}"')
-    robot = read_robot(write(tmp_path, "odd.urdf", text))
+    robot = read_robot(RobotFiles(write(tmp_path, "odd.urdf", text)))
     given = replace(motion(0), names=tuple(joint.name for joint in robot.joints))
     file = write(tmp_path, "t.csv", csv_text(given, robot))
     np.testing.assert_array_equal(read_motion(file, robot.joints).q, given.q)

@@ -22,7 +22,7 @@ from vdsm_pin.report.scene_rows import scene_words
 from vdsm_pin.robots.by_itself import POSES
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
-from vdsm_pin.robots.files import HULLS, MeshCover
+from vdsm_pin.robots.files import HULLS, MeshCover, RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.trajectory_csv import csv_text
@@ -252,7 +252,7 @@ def test_random_pairs_keep_what_dense_samples_by_coal_say(
     write_cube(tmp_path / MESH, 4.0)
     for name, solids in (("a", HULLS), ("b", MeshCover("parts", 2))):
         urdf = write(tmp_path, f"{name}.urdf", random_urdf(rng, 4))
-        robots.append(read_robot(urdf, solids=solids))
+        robots.append(read_robot(RobotFiles(urdf, solids=solids)))
         q = rng.uniform(-0.4, 0.4, (3, len(robots[-1].joints)))
         motions.append(Motion(q, times=times))
         joints = tuple(joint.name for joint in robots[-1].joints)

@@ -22,7 +22,7 @@ from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.other_robots import read_other
 from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.second_opinion import link_shapes
-from vdsm_pin.robots.urdf import robot_of
+from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.coal_bodies import coal_obstacle
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
@@ -195,7 +195,7 @@ def cell_of(
     Raises:
         InvalidInput: If a file is bad or a value makes no sense.
     """
-    read = robot_of(robot)
+    read = read_robot(robot)
     required = required_clearance, required_self_clearance
     named = (*robot.files, *read.more_files)
     of_files: Named = ()
@@ -222,7 +222,7 @@ def read_cell(path: str | Path) -> Cell:
         InvalidFile: If the file or one that it names breaks its contract.
     """
     file = read_cell_file(Path(path))
-    robot = robot_of(file.robot)
+    robot = read_robot(file.robot)
     required, required_self = file.required
     pose = np.eye(4)
     pose[:3, :3] = file.frame.rotation

@@ -113,13 +113,16 @@ class RobotFiles:
     """A robot, by files and what is said of them.
 
     Args:
-        urdf: The robot.
-        srdf: Pairs that are not held apart; None: neighbours are not.
-        package_dirs: Where `package://` is looked for.
-        lock: Joints that stand still; [rad] or [m].
-        group: Of the SRDF, whose joints alone move.
+        urdf: The URDF, or a xacro file.
+        srdf: Its SRDF, for the pairs of links that are not held apart, its groups and a
+            planar or floating base; None: neighbours are not held apart.
+        package_dirs: Where `package://NAME/REST` is looked for, as NAME/REST or REST;
+            then beside the URDF and above it.
+        lock: Values of joints that stand still; [rad] or [m].
+        group: Of the SRDF: its joints alone move, others stand where `lock` says or
+            at 0. None: all move that are not locked.
         solids: What stands for the meshes of links.
-        joint_limits: A joint_limits.yaml.
+        joint_limits: A joint_limits.yaml of MoveIt; the stricter limit counts.
     """
 
     urdf: Path

@@ -17,7 +17,7 @@ from vdsm_pin.robots.by_itself import limit_checks, pose_check
 from vdsm_pin.robots.files import HULLS, files_of_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.trajectory_files import path_of, read_motion
-from vdsm_pin.robots.urdf import robot_of
+from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.records import Check
 
 HELD: Final = (
@@ -33,7 +33,7 @@ def read_other(one: OtherFile) -> Others:
         InvalidFile: If one of its files breaks its contract.
     """
     files = files_of_robot(one.model, one.folder)
-    robot = robot_of(files)
+    robot = read_robot(files)
     motion = read_motion(one.trajectory, robot.joints, one.topic, robot.values)
     path = path_of(one.trajectory, motion)
     base, *joints = robot.tree.joints

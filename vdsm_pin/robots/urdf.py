@@ -1,15 +1,14 @@
 """A URDF and its SRDF to a robot: joints, solids, pairs that are held apart."""
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.files import HULLS, MeshCover, RobotFiles
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.joints import JointReader, Moving
 from vdsm_pin.robots.link_solids import LinkReader
@@ -19,50 +18,31 @@ from vdsm_pin.robots.srdf import Srdf
 from vdsm_pin.robots.xacro import urdf_text
 
 
-def read_robot(
-    urdf: Path,
-    srdf: Path | None = None,
-    package_dirs: tuple[Path, ...] = (),
-    lock: Mapping[str, float] | None = None,
-    group: str | None = None,
-    solids: MeshCover = HULLS,
-    joint_limits: Path | None = None,
-) -> Robot:
-    """The robot of a URDF.
-
-    Args:
-        urdf: The URDF, or a xacro file.
-        srdf: Its SRDF, for the pairs of links that are not to be held apart, its groups
-            and a planar or floating base.
-        package_dirs: Where `package://NAME/REST` is looked for, as NAME/REST or REST;
-            then beside the URDF and above it.
-        lock: Values of joints that stand still; [rad] or [m].
-        group: Of the SRDF: its joints alone move, others stand where `lock` says or
-            at 0. None: all move that are not locked.
-        solids: What stands for the meshes of links.
-        joint_limits: A joint_limits.yaml of MoveIt; the stricter limit counts.
+def read_robot(files: RobotFiles) -> Robot:
+    """The robot of some files.
 
     Raises:
         InvalidFile: If a file breaks its contract, a mesh is missing or far too large,
             or a joint is of a kind that is not judged.
         InvalidInput: If a group is named without a SRDF.
     """
-    text, included = urdf_text(urdf, package_dirs)
+    urdf, group, solids = files.urdf, files.group, files.solids
+    text, included = urdf_text(urdf, files.package_dirs)
     try:
         validate_urdf(text, geometry_only=True)
     except InvalidInput as error:
         raise InvalidFile(file=urdf, problem=str(error)) from None
     document = ET.fromstring(text)
-    more = Srdf(srdf, document) if srdf is not None else None
+    more = Srdf(files.srdf, document) if files.srdf is not None else None
     if group is not None and more is None:
         message = f"group {group!r} needs a SRDF, which lists its joints"
         raise InvalidInput(message)
     moves = more.group(group) if more is not None and group is not None else None
-    limits = read_limits(joint_limits) if joint_limits is not None else {}
+    limits = read_limits(files.joint_limits) if files.joint_limits else {}
     base = more.base() if more is not None else None
-    reader = JointReader(urdf, Moving(moves, lock or {}, limits, base))
+    reader = JointReader(urdf, Moving(moves, files.lock, limits, base))
     reader.read(document)
-    links = LinkReader(urdf, package_dirs, solids)
+    links = LinkReader(urdf, files.package_dirs, solids)
     bodies = _bodies(links, document, reader)
     tree = Tree(tuple(reader.joints))
     disabled = more.disabled() if more is not None else {}
@@ -81,23 +61,6 @@ def read_robot(
         notes=(*reader.notes, *_not_judged(document)),
         more_files=(*included, *links.meshes(document)),
         covers=links.covers,
-    )
-
-
-def robot_of(files: RobotFiles) -> Robot:
-    """The robot of some files.
-
-    Raises:
-        InvalidInput: If a file is bad or a value makes no sense.
-    """
-    return read_robot(
-        files.urdf,
-        files.srdf,
-        files.package_dirs,
-        files.lock,
-        files.group,
-        files.solids,
-        files.joint_limits,
     )
 
 
