@@ -190,3 +190,23 @@ def test_it_is_cold_until_a_plan_was_made_to_its_end(
     kept.note_planned()
     assert not kept.is_cold()
     assert kept.default_limit() == 60.0
+
+
+def test_other_versions_are_cold_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was compiled before an upgrade is of no use after it."""
+    monkeypatch.setattr(kept, "folders", lambda: iter([tmp_path / "kept"]))
+    (tmp_path / "package" / "proof").mkdir(parents=True)
+    monkeypatch.setattr(kept, "__file__", str(tmp_path / "package" / "kept.py"))
+    source = tmp_path / "package" / "proof" / "tree.py"
+    for file in (tmp_path / "package" / "kept.py", source):
+        file.write_text("one = 1\n")
+    kept.note_planned()
+    assert not kept.is_cold()
+    source.write_text("one = 10\n")
+    assert kept.is_cold()
+    kept.note_planned()
+    assert not kept.is_cold()
+    monkeypatch.setattr(kept, "version", lambda name: "another")
+    assert kept.is_cold()
