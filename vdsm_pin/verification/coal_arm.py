@@ -147,10 +147,7 @@ class CoalArm:
             OutOfTime: If the time is over.
         """
         for row, pair in self._near(trajectory, room, travel, deadline):
-            for first in range(0, len(pair), CHUNK_PAIRS):
-                deadline.check()
-                part = slice(first, first + CHUNK_PAIRS)
-                yield self.measured(trajectory, row[part].astype(float), pair[part])
+            yield from self._at(trajectory, row, pair, deadline)
 
     def spread(
         self, trajectory: Trajectory, deadline: Deadline = NO_LIMIT
@@ -161,13 +158,18 @@ class CoalArm:
             OutOfTime: If the time is over.
         """
         others = np.flatnonzero(self._column < 0)
-        for row in np.unique(
-            np.linspace(0, trajectory.n_samples - 1, SPREAD).astype(int)
-        ):
-            for first in range(0, len(others), CHUNK_PAIRS):
-                deadline.check()
-                part = others[first : first + CHUNK_PAIRS]
-                yield self.measured(trajectory, np.full(part.size, float(row)), part)
+        rows = np.linspace(0, trajectory.n_samples - 1, SPREAD).astype(np.int64)
+        for row in np.unique(rows):
+            yield from self._at(trajectory, np.full(others.size, row), others, deadline)
+
+    def _at(
+        self, trajectory: Trajectory, row: IntArray, pair: IntArray, deadline: Deadline
+    ) -> Iterator[CoalDistances]:
+        """Measure pairs at rows, shape (m,) each, some at a time."""
+        for first in range(0, len(pair), CHUNK_PAIRS):
+            deadline.check()
+            part = slice(first, first + CHUNK_PAIRS)
+            yield self.measured(trajectory, row[part].astype(np.float64), pair[part])
 
     def measured(
         self, trajectory: Trajectory, moments: FloatArray, pair: IntArray

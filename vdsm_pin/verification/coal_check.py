@@ -90,11 +90,7 @@ class CoalLog:
             found = arm.measured(trajectory, np.array([near.moment]), pair)
             self.approaches[k] = replace(near, coal=float(found.distance[0]))
             if not np.isfinite(found.upper[0]):  # as the proof has it
-                covered = (
-                    arm.pairs.covered[arm.pairs.one[pair]]
-                    | (arm.pairs.covered[arm.pairs.other[pair]])
-                )
-                upper = np.where(covered, np.inf, near.upper)
+                upper = np.where(arm.pairs.covered[pair], np.inf, near.upper)
                 found = replace(found, lower=np.array([near.lower]), upper=upper)
             yield found
 
@@ -149,20 +145,14 @@ def check_coal(
         OutOfTime: If the time is over.
         VerificationFailed: If Coal refuses a shape.
     """
-    arm, evidence, log = (
-        CoalArm(robot, problem, deadline),
-        CoalEvidence(),
-        log or CoalLog(),
-    )
+    arm, evidence = CoalArm(robot, problem, deadline), CoalEvidence()
+    log = log or CoalLog()
     if not arm.pairs.one.size:
         return ()
+    room, travel = problem.manipulator.most_radius, TOLERANCES.coal_travel
     rows = chain(
-        arm.near(
-            trajectory, arm.problem.manipulator.most_radius,
-            TOLERANCES.coal_travel, deadline,
-        ),
-        arm.spread(trajectory, deadline),
-    )  # fmt: skip
+        arm.near(trajectory, room, travel, deadline), arm.spread(trajectory, deadline)
+    )
     for found in chain(log.answers(arm, trajectory), _kept(rows, arm, proved, log)):
         # Of a link whose hull is flat Coal says nothing; elsewhere it has to agree.
         silent, excess = np.isnan(found.distance), found.disagreement

@@ -30,7 +30,7 @@ class CoalPairs:
         judged: Number of each pair as it is judged; -1 for a body of several parts,
             shape (n_pairs,).
         covered: Whether hulls around a body, nearer than itself, are judged in its
-            place, shape (n_names,).
+            place, shape (n_pairs,).
     """
 
     def __init__(self, problem: PlanningProblem) -> None:
@@ -51,10 +51,9 @@ class CoalPairs:
         self._count = np.bincount(pair, minlength=self._keys.size)
         self._first = np.cumsum(self._count) - self._count
         self.judged = np.where(self._count == 1, self._parts[self._first], -1)
-        self.covered = np.zeros(len(self.names), np.bool_)
-        self.covered[len(arm.axis_names) : self.n_own] = [
-            isinstance(solid, Mesh) for solid in carried
-        ]
+        meshes = [solid.name for solid in carried if isinstance(solid, Mesh)]
+        hulls = [self._own[name] for name in meshes]
+        self.covered = np.isin(self.one, hulls) | np.isin(self.other, hulls)
 
     def named(self, pair: int) -> tuple[str, str]:
         """The names of both bodies of a pair."""
