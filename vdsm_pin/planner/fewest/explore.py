@@ -54,6 +54,9 @@ STEP: Final = 0.08
 PLACES: Final = 8
 """Largest number of joints at which a knee is tried."""
 
+ROOMY: Final = 0.96
+"""Part of the tips at which some arm stands where nothing confines it; [-]."""
+
 LOG: Final = logging.getLogger(__name__)
 
 
@@ -137,9 +140,10 @@ def explore(
     stuck: NoWayOut | None = None
     inserted: Stuck | None = None
     spaces: dict[tuple[float, float, int], TipSpace] = {}
-    levels, proofs = effort.levels, [_cut_off, _hemmed_in] if effort.proves else []
+    proofs = [_cut_off, _hemmed_in] if effort.proves else []
+    levels, confined = effort.levels, True
     while levels:
-        if best.found is None:
+        if best.found is None and confined:
             levels = confined_first(levels)
         level, levels = levels[0], levels[1:]
         ease = max(level.ease, least_ease)
@@ -159,7 +163,7 @@ def explore(
                 now = _inserted(now, spaces[key], level, soon)
                 inserted = now.stuck
             elif isinstance(level, Search):
-                found = _look(judge, level, rows, proof, weights)
+                found, confined = _look(judge, level, rows, proof, weights)
                 now = Outcome(judge, found, rows, proof, inserted)
         except NoWayOut as error:
             stuck = error
@@ -247,8 +251,12 @@ def _hemmed_in(
 
 def _look(
     judge: Judge, level: Search, rows: PathRows, proof: TipProof, weights: CostWeights
-) -> Searched | None:
-    """One level: a roadmap, a search, and growth where it falls short."""
+) -> tuple[Searched | None, bool]:
+    """One level: a roadmap, a search, and growth where it falls short.
+
+    Returns:
+        What it found, and whether there are many tips at which no arm of it stands.
+    """
     problem = judge.problem
     arm = problem.manipulator
     length = arm.total_length
@@ -259,7 +267,7 @@ def _look(
         problem, judge.rough, judge.pricing(weights), route, shapes, level.around
     )
     roadmap, start_node = with_start(judge, roadmap, weights)
-    rng = np.random.default_rng(SEED)
+    rng, standing = np.random.default_rng(SEED), np.diff(roadmap.tip_nodes) > 0
     found = search(judge, roadmap, start_node, level.rounds)
     for _ in range(level.grow):
         if found is None or not found.missing > 0.0:
@@ -274,7 +282,7 @@ def _look(
         if again is None or not again.missing < found.missing:
             break
         found = again
-    return found
+    return found, bool(standing.mean() < ROOMY)
 
 
 def _unreached(found: Searched) -> bool:

@@ -130,10 +130,7 @@ fine. The numbers were found by trial on the paper's problems and HRM-2000.
 
 
 def confined_first(levels: tuple[Level, ...]) -> tuple[Level, ...]:
-    """Levels to come where nothing is drawn yet: the first insertions before `BESIDE`.
-
-    Where the path is confined, these draw it sooner.
-    """
+    """Levels to come where arms are confined: the first insertions before `BESIDE`."""
     if levels[:3] == (BESIDE, *FIRST):
         return (*FIRST, BESIDE, *levels[3:])
     return levels
