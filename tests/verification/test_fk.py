@@ -11,7 +11,7 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import fk
-from vdsm_pin.verification.fk import CHUNK, check_fk, check_planned
+from vdsm_pin.verification.fk import CHUNK, check_fk
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
@@ -40,7 +40,7 @@ def with_length(link: int, change: float) -> Manipulator:
 
 def test_the_arm_agrees_with_itself() -> None:
     n = 2 * CHUNK + 17
-    check = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(n))
+    (check,) = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(n))
     assert check.verdict is Verdict.CERTIFIED
     assert check.count == 9 * n
     assert 0.0 <= check.worst < 1e-12
@@ -51,7 +51,7 @@ def test_the_arm_agrees_with_itself() -> None:
 def test_both_sides_of_the_tolerance(change: float, passes: bool) -> None:
     """A last link longer by so much moves the tip by as much and nothing else."""
     arm = with_length(8, change)
-    check = check_fk(load_robot(HRM8), problem_for(arm), trajectory_of(40))
+    (check,) = check_fk(load_robot(HRM8), problem_for(arm), trajectory_of(40))
     assert (check.verdict is Verdict.CERTIFIED) == passes
     assert check.worst == pytest.approx(change, rel=1e-4)
     assert check.where.endswith("O9")
@@ -59,7 +59,7 @@ def test_both_sides_of_the_tolerance(change: float, passes: bool) -> None:
 
 def test_a_wrong_arm_is_refuted_where_it_is_worst() -> None:
     arm = with_length(3, 0.001)
-    check = check_fk(load_robot(HRM8), problem_for(arm), trajectory_of(CHUNK + 40))
+    (check,) = check_fk(load_robot(HRM8), problem_for(arm), trajectory_of(CHUNK + 40))
     assert check.verdict is Verdict.REFUTED
     assert check.worst == pytest.approx(0.001)
 
@@ -71,7 +71,7 @@ def test_missing_evidence_is_no_pass(monkeypatch: pytest.MonkeyPatch) -> None:
         return centres
 
     monkeypatch.setattr(fk, "joint_centres", with_hole)
-    check = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(5))
+    (check,) = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(5))
     assert check.verdict is Verdict.REFUTED
     assert check.worst == np.inf
     assert (check.moment, check.where) == (2.0, "joint centre O5")
@@ -81,11 +81,11 @@ def test_planned_centres_are_held_against_pinocchio() -> None:
     rows = trajectory_of(CHUNK + 40)
     centres = joint_centres(HRM8, rows.x0, rows.alpha, rows.theta).copy()
     robot = load_robot(HRM8)
-    check = check_planned(robot, rows, centres)
+    _, check = check_fk(robot, problem_for(HRM8), rows, centres)
     assert (check.verdict, check.count) == (Verdict.CERTIFIED, 9 * rows.n_samples)
     assert 0.0 <= check.worst < 1e-12
     centres[CHUNK + 3, 6, 2] += 1.1e-9
-    check = check_planned(robot, rows, centres)
+    _, check = check_fk(robot, problem_for(HRM8), rows, centres)
     assert check.verdict is Verdict.REFUTED
     assert (check.moment, check.where) == (CHUNK + 3, "joint centre O7")
     judged = verify(problem_for(HRM8), rows.part(CHUNK, CHUNK + 9), robot,
@@ -110,11 +110,11 @@ def test_the_worst_centre_is_named_wherever_it_is(
             row, joint = rng.integers(0, 11), rng.integers(0, HRM8.n_links + 1)
             off[row, joint] = size
             wrong = honest + off[:, :, None] * np.array([0.6, 0.0, -0.8])
-            check = fk.check_planned(robot, motion, wrong)
+            _, check = check_fk(robot, problem_for(HRM8), motion, wrong)
             assert (check.verdict, check.moment) == (verdict, row)
             assert check.where == f"joint centre O{joint + 1}"
             assert check.worst == pytest.approx(size, abs=2e-15, rel=1e-5)
             assert check.count == 11 * (HRM8.n_links + 1)
     honest[5, 2, 1] = np.nan
-    check = fk.check_planned(robot, motion, honest)
+    _, check = check_fk(robot, problem_for(HRM8), motion, honest)
     assert (check.verdict, check.moment, check.worst) == (Verdict.REFUTED, 5, np.inf)

@@ -1,6 +1,6 @@
 """Forward kinematics by two roads: Pinocchio on the URDF against the closed form."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -29,84 +29,80 @@ def check_fk(
     robot: RobotModel,
     problem: PlanningProblem,
     trajectory: Trajectory,
+    centres: FloatArray | None = None,
     deadline: Deadline = NO_LIMIT,
-) -> Check:
-    """Compare every joint centre of every row with the closed form.
+) -> tuple[Check, ...]:
+    """Compare every joint centre of every row with the closed form and the plan.
 
     Args:
         robot: The arm in Pinocchio.
         problem: Names the arm of the closed form.
         trajectory: What is judged.
+        centres: Joint centres of Step 6 that the angles were solved from, shape
+            (n_samples, N + 1, 3); None where they are not known; [m].
         deadline: When to give up.
 
     Returns:
-        The largest distance between the two, in metres. They compute the same thing, so
-        a difference refutes one of them and with it every other check. It is often 0 to
-        the last bit, because both turn by yaw and pitch in the same order.
+        The largest distances from Pinocchio's, in metres. The closed form computes the
+        same thing, so a difference refutes one of them and with it every other check.
+        It is often 0 to the last bit, because both turn by yaw and pitch in the same
+        order.
 
     Raises:
         OutOfTime: If the time is over.
     """
-    arm = problem.manipulator
-
-    def closed_form(rows: slice) -> FloatArray:
-        values = trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]
-        return joint_centres(arm, *values)
-
-    return _compared(NAME, robot, trajectory, closed_form, deadline)
-
-
-def check_planned(
-    robot: RobotModel,
-    trajectory: Trajectory,
-    centres: FloatArray,
-    deadline: Deadline = NO_LIMIT,
-) -> Check:
-    """Compare every joint centre of every row with the one that was planned.
-
-    Args:
-        robot: The arm in Pinocchio.
-        trajectory: The angles that were solved from the centres.
-        centres: Joint centres of Step 6, shape (n_samples, N + 1, 3); [m].
-        deadline: When to give up.
-
-    Returns:
-        The largest distance between the two, in metres.
-
-    Raises:
-        OutOfTime: If the time is over.
-    """
-    return _compared(PLANNED, robot, trajectory, lambda rows: centres[rows], deadline)
-
-
-def _compared(
-    name: str,
-    robot: RobotModel,
-    trajectory: Trajectory,
-    expected: Callable[[slice], FloatArray],
-    deadline: Deadline,
-) -> Check:
-    """Hold Pinocchio's joint centres against others, some rows at a time."""
-    worst, row, joint = -np.inf, 0, 0
+    found = [_Worst(NAME)] if centres is None else [_Worst(NAME), _Worst(PLANNED)]
     for first in range(0, trajectory.n_samples, CHUNK):
         deadline.check()
         part = slice(first, first + CHUNK)
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
-        found = robot.joint_centres(*joints)
-        residual = np.linalg.norm(found - expected(part), axis=2)
+        theirs, ours = (
+            robot.joint_centres(*joints),
+            [joint_centres(problem.manipulator, *joints)],
+        )
+        ours += [] if centres is None else [centres[part]]
+        for one, expected in zip(found, ours, strict=True):
+            one.see(first, np.linalg.norm(theirs - expected, axis=2))
+    return tuple(one.check() for one in found)
+
+
+@dataclass
+class _Worst:
+    """The joint centre that is farthest off so far.
+
+    Args:
+        name: Of the row.
+        off: How far; [m].
+        row: Where, from 0.
+        joint: Which, from 0.
+        count: How many were compared.
+    """
+
+    name: str
+    off: float = -np.inf
+    row: int = 0
+    joint: int = 0
+    count: int = 0
+
+    def see(self, first: int, residual: FloatArray) -> None:
+        """Compare more rows, from `first` on, shape (n, N + 1); [m]."""
         residual[np.isnan(residual)] = np.inf
-        here, centre = np.unravel_index(int(np.argmax(residual)), residual.shape)
-        if residual[here, centre] > worst:
-            worst = float(residual[here, centre])
-            row, joint = first + int(here), int(centre)
-    passed = worst <= TOLERANCES.joint_centre
-    return Check(
-        name=name,
-        verdict=Verdict.CERTIFIED if passed else Verdict.REFUTED,
-        count=trajectory.n_samples * (trajectory.n_links + 1),
-        worst=worst,
-        limit=TOLERANCES.joint_centre,
-        unit="m",
-        where=f"joint centre O{joint + 1}",
-        moment=row,
-    )
+        row, joint = np.unravel_index(int(np.argmax(residual)), residual.shape)
+        self.count += residual.size
+        if residual[row, joint] > self.off:
+            self.off = float(residual[row, joint])
+            self.row, self.joint = first + int(row), int(joint)
+
+    def check(self) -> Check:
+        """The row of evidence."""
+        passed = self.off <= TOLERANCES.joint_centre
+        return Check(
+            name=self.name,
+            verdict=Verdict.CERTIFIED if passed else Verdict.REFUTED,
+            count=self.count,
+            worst=self.off,
+            limit=TOLERANCES.joint_centre,
+            unit="m",
+            where=f"joint centre O{self.joint + 1}",
+            moment=self.row,
+        )

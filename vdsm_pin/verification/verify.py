@@ -119,8 +119,10 @@ def verify(
         problem, proof, counterexamples, contacts, deadline, nominal=clear
     )
     checks = [
-        *guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline)),
-        *judgement.planned(robot, centres),
+        *guarded(
+            fk.NAME,
+            lambda: fk.check_fk(robot, problem, trajectory, centres, deadline),
+        ),
         *check_limits(problem, trajectory),
         *problem.scene.checks_of_carriers(),
         *tip.checks,
@@ -239,15 +241,6 @@ class _Judgement:
         motion = self.problem, self.trajectory, self.problem.errors
         asked = *motion, proved.proof, self.deadline, proved.too_close
         return self.extras.take("first contact", (), arm_contacts, *asked)
-
-    def planned(
-        self, robot: RobotModel, centres: FloatArray | None
-    ) -> tuple[Check, ...]:
-        """Joint centres by Pinocchio against those planned, where there are any."""
-        if centres is None:
-            return ()
-        motion = robot, self.trajectory, centres, self.deadline
-        return guarded(fk.PLANNED, lambda: fk.check_planned(*motion))
 
     def by_coal(
         self, robot: RobotModel, lowers: ProvedLowers, log: CoalLog
