@@ -17,6 +17,7 @@ from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.repair.robot import repair_robot
+from vdsm_pin.repair.rounds import Places
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
@@ -183,3 +184,13 @@ def test_command_writes_what_verify_certifies(tmp_path: Path) -> None:
     again = ["verify", *common, str(out / "trajectory.csv"), "--out"]
     ended = CliRunner().invoke(app, [*again, str(tmp_path / "v")], obj="vdsm verify")
     assert ended.exit_code == 0, ended.output
+
+
+def test_waypoints_are_not_added_at_the_time_of_another_one() -> None:
+    """Moments that differ by rounding have one time; a motion like that is no path."""
+    times, same = np.array([5.0, 5.5, 9.0]), np.nextafter(1.0 / 3.0, 1.0)
+    moments = np.array([same, np.nextafter(1.0, 0.0), 1.5, 1e-9])
+    found = Places.within(np.array([3, 1]), moments, times)
+    assert found.moments.tolist() == [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 1.5, 2.0]
+    assert (np.diff(found.through(times)) > 0.0).all()
+    assert len(Places.within(np.array([3, 1]), moments).moments) == 9

@@ -70,7 +70,8 @@ class _Motion:
     def pushed(self, margins: dict[int, float], moments: FloatArray) -> "_Motion":
         """The motion sampled closely, its pairs pushed apart by margins; [m]."""
         slopes, problem = self.slopes, self.slopes.problem
-        places = Places.within(_parts(problem, self.rows), moments)
+        parts, times = _parts(problem, self.rows), self.rows.times
+        places = Places.within(parts, moments, times)
         if self.rows.is_smooth:
             return self._bulged(places, margins)
         rows, origins = _sampled(problem, self.rows, places), self.origins.at(places)

@@ -57,7 +57,8 @@ class _Motion:
         """The motion sampled closely, its pairs pushed apart by margins; [m]."""
         steps = np.abs(np.diff(self.rows.path.controls, axis=1)).sum(axis=1)
         parts = np.ceil(steps.max(axis=1, initial=0.0) / APART)
-        places = Places.within(np.maximum(1.0, parts).astype(np.int64), moments)
+        counts = np.maximum(1.0, parts).astype(np.int64)
+        places = Places.within(counts, moments, self.rows.times)
         origins, at = self.origins.at(places), places.through(self.moments)
         rows = sampled(self.rows, places)
         if rows.rates is not None:

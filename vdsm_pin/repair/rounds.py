@@ -25,6 +25,9 @@ V = TypeVar("V", bound=Verification)
 ROUNDS: Final = 12
 """Of pushing and judging."""
 
+SOON: Final = 1e-6
+"""A new waypoint is not so near another one, over the time of the motion; [-]."""
+
 APART: Final = float(np.radians(1.0))
 """How far samples lie apart in the joint that moves most; [rad], [m]."""
 
@@ -62,13 +65,27 @@ class Places:
     n_rows: int
 
     @classmethod
-    def within(cls, parts: IntArray, moments: FloatArray) -> "Places":
-        """Every interval in so many parts, shape (n_rows - 1,), and some moments."""
+    def within(
+        cls, parts: IntArray, moments: FloatArray, times: FloatArray | None = None
+    ) -> "Places":
+        """Every interval in so many parts, shape (n_rows - 1,), and some moments.
+
+        Args:
+            parts: The numbers of parts.
+            moments: In waypoints.
+            times: Of the rows; moments of nearly one time are left out; [s].
+        """
         first, last = np.cumsum(parts) - parts, float(len(parts))
         k = np.repeat(np.arange(len(parts)), parts)
         even = k + (np.arange(parts.sum()) - first[k]) / parts[k]
         inside = np.clip(moments, 0.0, last)
-        return cls(np.unique(np.concatenate([even, [last], inside])), len(parts) + 1)
+        found = cls(np.unique(np.concatenate([even, [last], inside])), len(parts) + 1)
+        if times is None:
+            return found
+        apart = np.diff(found.through(times)) > SOON * (times[-1] - times[0])
+        before_row = np.append(~apart & found.old[1:], False)
+        alone = np.append(True, apart) & ~before_row
+        return cls(found.moments[found.old | alone], found.n_rows)
 
     @property
     def row(self) -> IntArray:
