@@ -127,12 +127,14 @@ def least_gap(problem: PlanningProblem, joints: FloatArray) -> float:
     return float(np.linalg.norm(off, axis=2).min()) - radius
 
 
-@pytest.mark.parametrize(("row", "degree"), [(100, 3), (700, 3), (700, 5)])
+@pytest.mark.parametrize(
+    ("row", "degree", "gap"), [(100, 3, -0.002), (700, 3, -0.01), (700, 5, -0.002)]
+)
 def test_smooth_motion_is_repaired_as_a_smooth_one(
-    row: int, degree: int, tmp_path: Path
+    row: int, degree: int, gap: float, tmp_path: Path
 ) -> None:
-    """On its way to the path (row 100) and while it draws (row 700)."""
-    motion, problem = planned("paper/obs2")[1], beside("paper/obs2", row, 3, -0.002)
+    """On its way to the path (row 100) and while it draws (row 700), in rounds."""
+    motion, problem = planned("paper/obs2")[1], beside("paper/obs2", row, 3, gap)
     steps = np.abs(np.diff(motion.joints, axis=0)).max(axis=1)
     times = np.append(0.0, np.cumsum(5.0 * np.maximum(steps, 1e-3)))
     rates = np.gradient(motion.joints, times, axis=0)

@@ -118,7 +118,7 @@ class _Motion:
         origins.too_near(room(rows.q), np.array([*margins.values()]), names)
         rows, moved = bulged(rows, lambda q: room(q).min(axis=1), up, origins.fixed)
         rows = _led_back(slopes, rows, moved & ~origins.fixed, tips)
-        kept = origins.kept(rows.q, moved) & ((origins.given >= 0) | moved)
+        kept = places.old | moved  # in between the curve is what it was
         rows, origins = rows.only(kept), origins.only(kept)
         found = Trajectory.of_joints(
             *(rows.q, spots.on_path[kept], spots.path_m[kept]),

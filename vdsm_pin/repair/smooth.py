@@ -83,6 +83,8 @@ def bulged(
         if not -np.inf < gaps[k] < 0.0:
             break
         shift = up(k, q[k]) - q[k]
+        if not shift.any():
+            break  # nor would the next one be
         slow = SLOW * float(np.abs(shift).max()) / fast
         low, high = _ends(times, k, (gaps >= 0.0, fixed), slow)
         width = np.where(times < times[k], times[k] - low, high - times[k])
