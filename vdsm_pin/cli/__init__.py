@@ -1,6 +1,6 @@
 """The `vdsm` command: arguments, exit codes and nothing else.
 
-One module a command, or a few that belong together. They import what they work with
+One module for commands that belong together. They import what they work with
 inside the commands, so that `vdsm --help` answers at once.
 """
 
