@@ -293,6 +293,14 @@ def test_a_half_space_cannot_be_turned(tmp_path: Path) -> None:
         files.verify(box)
 
 
+def test_a_part_that_no_body_has_is_refused(tmp_path: Path) -> None:
+    """It would leave nothing out, without a word."""
+    for name in ("camera part 1", "camera part 9"):
+        data = problem(camera(), ignore_pairs=[[name, "link 1"]])
+        with pytest.raises(InvalidInput, match=f"part of a body '{name}'"):
+            Files(tmp_path, data, STILL).verify()
+
+
 @pytest.mark.parametrize(("off", "turn"), [(0, 30), (50, 0), (89.9, 30), (90.1, 0)])
 @pytest.mark.parametrize("shape", ["box", "cylinder", "another body"])
 def test_bodies_that_nothing_grows_are_refuted_where_they_meet(

@@ -7,7 +7,7 @@ from math import nan
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Location, Side
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -283,6 +283,11 @@ def _check_input(problem: PlanningProblem, trajectory: Trajectory) -> None:
         message = f"trajectory has {found} links, the problem's arm has {expected}"
         raise InvalidInput(message)
     check_timed(problem.scene, trajectory)
-    for pair in problem.manipulator.ignore_pairs:
-        problem.manipulator.check_ignored(pair, problem.scene.names)
+    arm = problem.manipulator
+    for pair in arm.ignore_pairs:
+        arm.check_ignored(pair, problem.scene.names)
+        for name in (name for name in pair if arm.owner_of(name) != name):
+            known = tuple(one.name for one in arm.convex_bodies)
+            if name not in known:
+                raise UnknownName(kind="part of a body", name=name, known=known)
     problem.check_errors(problem.errors)
