@@ -105,3 +105,24 @@ def test_no_page_of_the_site_is_left_without_a_way_to_it() -> None:
     for page in PAGES:
         path = page.relative_to(ROOT / "docs").with_suffix("").as_posix()
         assert path == "index" or path in named, path
+
+
+def test_every_script_and_module_that_a_page_runs_is_there() -> None:
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+    for folder in ("docs", "examples", "reports", "benchmarks"):
+        pages += sorted((ROOT / folder).rglob("*.md"))
+    named = set()
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        for module in re.findall(r"python -m ((?:benchmarks|analysis)[\w.]*\w)", text):
+            named.add((page.name, module.replace(".", "/")))
+        for script in re.findall(r"python ((?:analysis|examples)/[\w/]+)\.py", text):
+            named.add((page.name, script))
+    lost = [
+        (page, name)
+        for page, name in sorted(named)
+        if not (ROOT / f"{name}.py").is_file()
+        and not (ROOT / name / "__main__.py").is_file()
+    ]
+    assert len(named) > 15
+    assert lost == []
