@@ -45,7 +45,7 @@ report: figures
 	$(BIN)/python analysis/step5_choices.py --out reports/paper
 	$(BIN)/python analysis/moving_obstacle.py --out reports/paper
 	$(BIN)/python analysis/closed_loop.py --out reports/paper
-	PYTHONPATH=. $(BIN)/python analysis/baselines.py --out reports/paper --sample 14
+	PYTHONPATH=. $(BIN)/python analysis/baselines.py --out reports/paper --sample 4
 
 claims: $(VENV)/.installed
 	PYTHONPATH=. $(BIN)/python analysis/claims.py
