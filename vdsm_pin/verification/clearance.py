@@ -24,6 +24,7 @@ from vdsm_pin.proof.layouts import (
     LOW,
     OTHER,
     OWN,
+    SLICES,
     TALLY,
     TIME,
     UP,
@@ -65,6 +66,7 @@ class ClearanceProof:
         best: Least bounds of each pair, as `proof.layouts` lays them out,
             shape (n_pairs, BEST); [m].
         profile: Brackets along the motion.
+        slices: Slices tried beyond one per interval and pair.
         n_intervals: Of the motion.
         late: Whether the time was over before all was judged.
         sent: Intervals whose brackets the sinks received: all, if there was time.
@@ -74,6 +76,7 @@ class ClearanceProof:
     counts: IntArray
     best: FloatArray
     profile: ClearanceProfile
+    slices: int
     n_intervals: int
     late: bool
     sent: int
@@ -204,6 +207,7 @@ def prove_clearance(
         counts=frozen(results.counts, np.int64),
         best=frozen(proof.best),
         profile=profile_of(results.profile, results.stride, proof.knots, n_links),
+        slices=int(results.tally[SLICES]),
         n_intervals=len(proof.knots.first) - 1,
         late=late,
         sent=sent,
