@@ -474,9 +474,13 @@ def test_no_triangle_behind_those_announced_is_left_out(
 ) -> None:
     """More bytes, or a second mesh behind the first: refused, never dropped."""
     content = trimesh.creation.box().export(file_type=kind)
-    for damaged in (content + bytes(50), content + content):
+    more = bytes([1, *49 * [0]])
+    for damaged in (content + more, content + content):
         with pytest.raises(InvalidFile, match=r"announces|promises"):
             read_mesh(write(tmp_path, f"a.{kind}", damaged))
+    if kind != "stl":
+        filled = read_mesh(write(tmp_path, f"a.{kind}", content + bytes(4000) + b"\n"))
+        assert len(filled.triangles) == 12
     if kind == "glb":
         size = len(content).to_bytes(4, "little")
         twice = content + content[12:]

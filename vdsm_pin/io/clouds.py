@@ -89,7 +89,7 @@ def _npy(stream: MeshStream) -> FloatArray:
         raise stream.invalid(problem) from None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
         raise stream.invalid(problem="is no array of numbers")
-    stream.check_end(data.read(1), f"an array of shape {array.shape}")
+    stream.check_end(data.read(), f"an array of shape {array.shape}")
     if array.ndim == 3:
         if not ((array == 0) | (array == 1)).all():
             problem = "has values besides 0 and 1, expected one of them for each cell"

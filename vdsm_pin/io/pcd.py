@@ -42,8 +42,8 @@ def read_pcd(stream: MeshStream) -> FloatArray:
             return _columns(stream, header, _unpacked(stream, header, data))
         case _:
             size = header.points * header.kind.itemsize
-            _check_size(stream, header, len(data), size)
-            table = np.frombuffer(data, header.kind)
+            _check_size(stream, header, data, size)
+            table = np.frombuffer(data[:size], header.kind)
             return np.column_stack([_first(table[axis]) for axis in "xyz"])
 
 
@@ -122,7 +122,7 @@ def _text(stream: MeshStream, header: _Header, data: bytes) -> FloatArray:
     starts = np.cumsum([0, *(int(np.prod(header.kind[name].shape)) for name in names)])
     place = [int(starts[names.index(axis)]) for axis in "xyz"]
     lines = data.decode("latin-1").rstrip().splitlines()
-    _check_size(stream, header, len(lines), header.points)
+    _check_size(stream, header, lines, header.points)
     with suppress(ValueError):  # told line by line below
         table = np.loadtxt(lines, ndmin=2, comments=None)
         if table.shape == (header.points, starts[-1]):
@@ -153,10 +153,9 @@ def _unpacked(stream: MeshStream, header: _Header, data: bytes) -> bytes:
     """What LZF packed, of the size that the header promises."""
     packed, size = np.frombuffer(data[:8].ljust(8, b"\0"), "<u4").tolist()
     wanted = header.points * header.kind.itemsize
-    _check_size(stream, header, len(data), 8 + packed)
-    _check_size(stream, header, size, wanted)
-    found = _from_lzf(data[8:], wanted)
-    if len(found) != wanted:
+    _check_size(stream, header, data, 8 + packed)
+    found = _from_lzf(data[8 : 8 + packed], wanted)
+    if not len(found) == size == wanted:
         raise stream.invalid(problem="has compressed data that is damaged")
     return found
 
@@ -191,9 +190,11 @@ def _from_lzf(data: bytes, size: int) -> bytes:
     return bytes(out) if at == end else b""
 
 
-def _check_size(stream: MeshStream, header: _Header, size: int, wanted: int) -> None:
+def _check_size(
+    stream: MeshStream, header: _Header, data: bytes | list[str], wanted: int
+) -> None:
     """Refuse bytes or lines that are fewer than the header announces, or more."""
-    if size < wanted:
+    if len(data) < wanted:
         problem = f"is cut short: its header promises {header.points} points"
         raise stream.invalid(problem)
-    stream.check_end(size - wanted, f"{header.points} points")
+    stream.check_end(data[wanted:], f"{header.points} points")

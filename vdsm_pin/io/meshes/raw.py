@@ -19,6 +19,9 @@ MAX_CORNERS: Final = 3 * MAX_TRIANGLES
 MAX_MESH_LINE: Final = 1 << 20
 """Longest line of a mesh or cloud in text; [bytes], a character each in Latin-1."""
 
+PADDING: Final = 1 << 16
+"""Most bytes that fill a file up behind its data: the largest pages of memory."""
+
 _BOM: Final = "\xef\xbb\xbf"  # of UTF-8, as Latin-1
 _UTF_16: Final = ("\xff\xfe", "\xfe\xff")
 
@@ -121,16 +124,19 @@ class MeshStream:
             raise self.invalid(problem, line=line)
         return values
 
-    def check_end(self, left: object, announced: str) -> None:
+    def check_end(self, left: bytes | object, announced: str) -> None:
         """Refuse what stands behind the last of what the header announces.
 
         Args:
-            left: What was not read: bytes or words; nothing if all was.
+            left: What was not read; nothing if all was. Zero bytes that fill a page, as
+                PCL writes them, and white space are nothing.
             announced: What the header announces.
 
         Raises:
             InvalidFile: If there is anything.
         """
+        if isinstance(left, bytes) and len(left) <= PADDING:
+            left = left.strip(b"\0 \t\r\n")
         if left:
             problem = f"has more data than its header announces: {announced}"
             raise self.invalid(problem)
