@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flint import arb
 
-from vdsm_pin.certificate_checker.motion import Interval, Slices
+from vdsm_pin.certificate_checker.motion import Branch, Interval, Slices
 from vdsm_pin.certificate_checker.solids import Body, Solid
 from vdsm_pin.certificate_checker.tree import TURNS, Joint, Tree
 
@@ -53,3 +53,23 @@ def test_reach_is_an_upper_bound(width: float, error: float) -> None:
     """Of the exact motion within the errors, at many moments."""
     angles = np.linspace(0.0, width, 101)[:, None] + np.linspace(-error, error, 21)
     assert (LEVER * np.sin(angles)).max() <= reached(width, (error, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("inner", [2, 4])
+@pytest.mark.parametrize("n_rates", [0, 1, 2])
+def test_pieces_are_of_the_degree_of_what_is_given(inner: int, n_rates: int) -> None:
+    """Straight, by control points in between, or by rates at both ends."""
+    knots, rates = np.zeros((3, 5)), [np.zeros((3, 5))] * n_rates
+    assert Branch(knots, None, None, rates).degree == 1 + 2 * n_rates
+    assert Branch(knots, None, np.zeros((2, inner, 5))).degree == 1 + inner
+    assert Branch(knots[:1], None, None, rates).degree == 1
+
+
+@pytest.mark.parametrize("part", [(0.0, 1.0), (0.25, 0.5), (0.5, 1.0), (0.0, 0.5)])
+def test_rates_of_a_part_are_those_within_it(part: tuple[float, float]) -> None:
+    """Of q = 3 t^2, whose joint turns by 2 q: value, rate and its change at the end."""
+    tree = Tree([Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 2.0, 0.0))])
+    interval = Interval(tree, [[arb(0), arb(0), arb(3)]])
+    end = part[1]
+    (found,) = interval.rates(*part)
+    assert found == pytest.approx([6.0 * end**2, 12.0 * end, 12.0], rel=1e-11)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.certificate_checker.balls import Rejected
-from vdsm_pin.certificate_checker.solids import Solid, boundary
+from vdsm_pin.certificate_checker.solids import Solid, away, boundary
 
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
 
@@ -55,6 +55,7 @@ def test_boundaries_cancel_where_loops_run_both_ways() -> None:
     halves = boundary([[0, 1, 2], [0, 2, 3]])
     assert halves == boundary([[0, 1, 2, 3]])
     assert halves != boundary([[0, 1, 2], [0, 3, 2]])
+    assert boundary([[0, 0, 1, 2, 2]]) == boundary([[0, 1, 2]])
     assert boundary([[0, 1, 2]] * 2) == {(0, 1): 2, (1, 2): 2, (0, 2): -2}
 
 
@@ -62,3 +63,24 @@ def test_the_extent_is_that_of_the_points_and_where_they_come_from() -> None:
     assert Solid("one", [[[0.5, -0.25, 0.0]]]).extent == 0.5
     assert Solid("far", [[[0.5, 0.0, 0.0]]], origin=[0.0, -4.0, 0.0]).extent == 4.5
     assert Solid("ball", [[[0.5, 0.0, 0.0]]], radius=0.25).extent == 0.75
+
+
+def test_points_lie_half_a_diagonal_from_the_middle_of_their_box() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        low, size = rng.normal(size=3), rng.uniform(0.1, 1.0, 3)
+        corners = low + size * np.indices((2, 2, 2)).reshape(3, -1).T
+        inner = low + size * rng.uniform(0.3, 0.7, (4, 3))
+        found = away(np.vstack([inner, corners]), 0.25)
+        assert found == pytest.approx(np.linalg.norm(size) / 2 + 0.25, rel=1e-11)
+
+
+def test_a_disc_reaches_by_its_radius_times_the_sine_of_its_axis() -> None:
+    rng = np.random.default_rng(2)
+    for radius in (0.001, 0.3, 2.0):
+        n, axis, point = rng.normal(size=(3, 3))
+        n, axis = n / np.linalg.norm(n), axis / np.linalg.norm(axis)
+        solid = Solid("disc", [[point]], radius=0.1, disc=(axis, radius))
+        sine = np.sqrt(1.0 - (axis @ n) ** 2)
+        expected = point @ n - 0.1 - radius * sine
+        assert solid.support(n, 0, 1) == pytest.approx(expected, rel=0, abs=1e-12)
