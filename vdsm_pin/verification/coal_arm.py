@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.geometry.row_bounds import coarse_bounds, link_gaps, row_brackets
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving
@@ -159,7 +159,7 @@ class CoalArm:
         """
         others = np.flatnonzero(self._column < 0)
         rows = np.linspace(0, trajectory.n_samples - 1, SPREAD).astype(np.int64)
-        for row in np.unique(rows):
+        for row in distinct(rows) if others.size else ():
             yield from self._at(trajectory, np.full(others.size, row), others, deadline)
 
     def _at(
