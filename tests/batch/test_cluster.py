@@ -139,6 +139,8 @@ def test_paths_start_from_the_folder_of_each_batch(tmp_path: Path) -> None:
         (found,) = cluster._run(cluster._Errand((task,), folder, versions()))
         assert found.result is not None
         assert name in found.result.row.reason
+    cluster._ours.process._worker.give_up()
+    del cluster._ours.process
     assert Path.cwd() == here
     with pytest.raises(InvalidInput, match="a worker has no folder"):
         cluster._run(cluster._Errand((task,), tmp_path / "three", versions()))

@@ -18,11 +18,13 @@ from oracles.random_robots import MESH, random_urdf
 from oracles.robot_certificates import BASES, VIRTUAL, Made, cell, text
 from oracles.robot_samples import Errors, Sampler
 
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.robots.cell import read_cell
-from vdsm_pin.robots.files import read_cell_file
+from vdsm_pin.robots.files import CellScene, read_cell_file
 from vdsm_pin.robots.trajectory_files import read_path
 
 Rng = np.random.Generator
+NOTHING = CellScene(Scene(), (), ())
 ERRORS: dict[str, Any] = {
     "joint_deg": {"bend": 0.4, "turn": 0.2},
     "slide": {"lift": 2},
@@ -131,7 +133,7 @@ def test_larger_errors_than_certified_are_refused(tmp_path: Path) -> None:
         made.texts["all.urdf"], made.cell["errors"] = urdf, ERRORS
         change(made)
         made.write()
-        source = read_cell_file(made.files[0]).source(named, ())
+        source = read_cell_file(made.files[0]).source(named, NOTHING)
         lines[0]["problem_sha256"] = source.sha256
         outcome = made.check(lines, fits=False)
         assert not outcome.accepted, what

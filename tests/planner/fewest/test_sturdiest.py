@@ -128,7 +128,7 @@ def hold_to_account(task: PlanningProblem) -> None:
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
     above = verify(
-        task, plan.trajectory, robot, errors=replace(below, joint=3.0 * error)
+        task.under(replace(below, joint=3.0 * error)), plan.trajectory, robot
     )
     assert above.verdict is not Verdict.CERTIFIED
     lost = re.search(r"start itself does not survive (\S+) deg", plan.notes[-1])
