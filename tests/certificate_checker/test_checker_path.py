@@ -1,5 +1,6 @@
 """What the certificate checker says of the desired path, against plain geometry."""
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -10,6 +11,7 @@ from flint import arb, ctx
 from vdsm_pin.certificate_checker.balls import Rejected, column, norm, number, unit
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.pointing import Pointing
 
 TINY = 1e-12
 
@@ -153,3 +155,25 @@ def test_a_hair_backwards_off_a_closed_path_is_not_once_round(same: float) -> No
     assert on == 7  # beyond the first one; the second lies a hair behind
     assert drawing.farthest == 7
     assert drawing.left
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_steepest_change_of_the_aim_is_that_of_one_side(
+    seed: int, closed: bool
+) -> None:
+    """Difference of the directions at its corners over its length, in plain numbers."""
+    rng = np.random.default_rng([7, seed])
+    corners = rng.uniform(-1.0, 1.0, (int(rng.integers(3, 7)), 3))
+    looks = rng.normal(size=(len(corners) + closed, 3))
+    looks /= np.linalg.norm(looks, axis=1, keepdims=True)
+    looks[-1] = looks[0] if closed else looks[-1]
+    pointing = Pointing(0.1, directions=looks)
+    asked = DesiredPath(corners[0], corners, closed, pointing=pointing)
+    round_ = np.concatenate([corners, corners[: int(closed)]])
+    sides = np.linalg.norm(np.diff(round_, axis=0), axis=1)
+    turned = np.linalg.norm(np.diff(looks, axis=0), axis=1)
+    found = float(Drawing(asked).steepest)
+    assert found == pytest.approx((turned / sides).max(), rel=1e-12)
+    straight = replace(asked, pointing=Pointing(0.1, directions=looks[:1]))
+    assert float(Drawing(straight).steepest) == 0.0

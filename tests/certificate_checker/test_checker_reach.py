@@ -15,13 +15,19 @@ LEVER = 0.7
 
 
 def reached(
-    width: float, errors: tuple[float, float, float], disc: float = 0.0
+    width: float,
+    errors: tuple[float, float, float],
+    disc: float = 0.0,
+    share: float = 1.0,
 ) -> float:
-    """Largest y of a point on the x axis that turns about z, errors included; [m]."""
+    """Largest y of a point on the x axis that turns about z, errors included; [m].
+
+    It turns by `width` in a slice that is the first `share` of an interval.
+    """
     joint = Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 1.0, 0.0), errors)
     tree = Tree([joint])
-    interval = Interval(tree, [[arb(0), arb(width)]])
-    slices = Slices(tree, [(interval, 0.0, 1.0)])
+    interval = Interval(tree, [[arb(0), arb(width / share)]])
+    slices = Slices(tree, [(interval, 0.0, share)])
     point = Solid("point", [[[LEVER, 0.0, 0.0]]], disc=((1.0, 0.0, 0.0), disc))
     body, at = Body(1, point), np.zeros(1, np.int64)
     found, _ = slices.reach(body, 0, at, np.array([[0.0, 1.0, 0.0]]))
@@ -32,8 +38,9 @@ def reached(
 @pytest.mark.parametrize("error", [0.0, 1e-3, 0.1])
 @pytest.mark.parametrize("tilt", [0.0, 2e-3, 0.05])
 @pytest.mark.parametrize("disc", [0.0, 0.2])
+@pytest.mark.parametrize("share", [1.0, 0.25])
 def test_reach_is_that_of_the_docs(
-    width: float, error: float, tilt: float, disc: float
+    width: float, error: float, tilt: float, disc: float, share: float
 ) -> None:
     """Height at an end, M h^2 / 8, h D / 2, Q, and what errors move at the ends."""
     far, turned = LEVER + disc, error + tilt
@@ -43,7 +50,7 @@ def test_reach_is_that_of_the_docs(
     moved = error * LEVER * (1.0 + cos(width)) / 2.0 + tilt * LEVER
     heights = max(disc, end)
     expected = heights + bend + drift + second + disc * turned + moved
-    found = reached(width, (error, 0.0, tilt), disc)
+    found = reached(width, (error, 0.0, tilt), disc, share)
     assert found == pytest.approx(expected, rel=1e-12)
 
 

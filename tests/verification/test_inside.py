@@ -396,3 +396,21 @@ def test_what_is_carried_alone_inside_a_mesh_is_the_nearest(tmp_path: Path) -> N
     assert found.min_clearance == found.least.upper.min() == -0.001
     worst = next(c for c in found.checks if c.name == "clearance from obstacles")
     assert (worst.worst, worst.where) == (-0.001, "the arm is inside 'housing'")
+
+
+def test_a_link_that_is_not_held_off_a_mesh_may_begin_within(tmp_path: Path) -> None:
+    """O_1 stands in one of two boxes, out of which link 1, left out, reaches.
+
+    Link 2 is clear of both, which lie before and behind it: no one plane serves both.
+    """
+    boxes = np.concatenate([box(0.004), np.array([0.03, 0.0, 0.0]) + box(0.004)])
+    path, rows = written(tmp_path, boxes)
+    asked = json.loads(path.read_text())
+    asked["manipulator"]["ignore_pairs"] = [["link 1", "housing"]]
+    path.write_text(json.dumps(asked))
+    file, found = verified(path, rows)
+    assert found.verdict is Verdict.CERTIFIED
+    proof = tmp_path / "c.certificate"
+    write_certificate(proof, found, Hashes(file.sha256, sha256(rows.read_bytes())))
+    outcome = check_certificate(proof, path, rows)
+    assert outcome.accepted, outcome.reason
