@@ -18,12 +18,17 @@ from oracles.certificate_oracle import frames_and_centres, sealed
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.certificate_checker.balls import Rejected
-from vdsm_pin.certificate_checker.motion import Branch
+from vdsm_pin.certificate_checker.motion import Branch, Interval, beside
 from vdsm_pin.certificate_checker.program import PRECISION
 from vdsm_pin.certificate_checker.rows import Rows
+from vdsm_pin.certificate_checker.tree import SLIDES, Joint
+from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.scene import Carrier, Moving, Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof import paths
+from vdsm_pin.proof import tree as trees
+from vdsm_pin.proof.tree import Kind
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import Verdict
 
@@ -282,3 +287,23 @@ def test_the_change_of_smooth_rows_is_judged_as_the_verifier_judges_it(
             assert accepted or more_than < 3e-3
             said[accepted] += 1
     assert min(said[True], said[False]) > 4
+
+
+def test_obstacles_on_a_carrier_follow_its_own_frames() -> None:
+    """Behind the joints of the arm; what rests is in the world, frame 0."""
+    place = np.eye(4)
+    joints = (
+        trees.Joint(0, Kind.PRISMATIC, trees.X, place, 0),
+        trees.Joint(1, Kind.PRISMATIC, trees.Y, place, 1),
+    )
+    times, knots = np.array([0.0, 2.0]), np.array([[0.0, 0.0], [3.0, 5.0]])
+    carrier = Carrier(trees.Tree(joints), paths.Path(knots, times=times))
+    ball = Sphere("ball", np.zeros(3), 0.1)
+    obstacles = [ball, Moving(ball, carrier, 1), Moving(ball, carrier, 2)]
+    own = Branch(np.array([[7.0], [8.0]]), times)
+    rail = Joint(0, SLIDES, (0, 0, 1), place, (0, 1.0, 0.0))
+    tree, path, frames = beside(own, [rail], obstacles)
+    assert frames == [0, 2, 3]
+    pose = Interval(tree, path.controls(0)).pose(0.5)
+    places = [[*map(float, pose[k][0].entries())] for k in (1, *frames[1:])]
+    assert places == [[0.0, 0.0, 7.5], [1.5, 0.0, 0.0], [1.5, 2.5, 0.0]]

@@ -414,3 +414,26 @@ def test_a_link_that_is_not_held_off_a_mesh_may_begin_within(tmp_path: Path) -> 
     write_certificate(proof, found, Hashes(file.sha256, sha256(rows.read_bytes())))
     outcome = check_certificate(proof, path, rows)
     assert outcome.accepted, outcome.reason
+
+
+def test_a_closed_path_may_be_drawn_on_without_leaving_it(tmp_path: Path) -> None:
+    """One and a half times to and fro: begun again is only what was left before."""
+    path, rows = written(tmp_path, box(0.004))
+    asked = json.loads(path.read_text())
+    ball = {"name": "far", "shape": "sphere", "center": [0, 3, 0], "radius": 0.1}
+    points = [[0.02, 0, 0], [0.024, 0, 0]]
+    asked["tip_path"] = {"start": points[0], "points": points, "closed": True}
+    path.write_text(json.dumps(asked | {"obstacles": [ball]}))
+    header, lap = rows.read_text().splitlines()[0], 0.008
+    stations = [0.001 * k % lap for k in range(13)]
+    lines = [
+        f"{k},1,{s!r},{min(s, lap - s)!r},0.0,0.0,0.0,0.0"
+        for k, s in enumerate(stations)
+    ]
+    rows.write_text("\n".join([header, *lines, ""]))
+    file, found = verified(path, rows)
+    assert found.verdict is Verdict.CERTIFIED
+    proof = tmp_path / "c.certificate"
+    write_certificate(proof, found, Hashes(file.sha256, sha256(rows.read_bytes())))
+    outcome = check_certificate(proof, path, rows)
+    assert outcome.accepted, outcome.reason
