@@ -395,6 +395,20 @@ def coal_of(body: ArmBody) -> Any:
     return hull, coal.Transform3s()
 
 
+def check_stations(asked: Any, rows: Trajectory, found: Verification) -> None:
+    """The witness on a link is its radius away from the place its station names."""
+    arm = asked.manipulator
+    for near in found.approaches:
+        if near.pair.body or near.deeper:
+            continue
+        q, k = rows.path.at_moments(np.array([near.moment])), near.pair.link
+        centres = joint_centres(arm, q[:, 0], q[:, 1::2], q[:, 2::2])[0]
+        axis = (centres[k] - centres[k - 1]) / arm.link_lengths[k - 1]
+        foot = centres[k - 1] + near.station * axis
+        away = np.linalg.norm(near.link_point - foot)
+        assert away == pytest.approx(arm.radius_of(k), abs=1e-6)
+
+
 def sampled(asked: Any, rows: Trajectory, times: FloatArray) -> dict[Any, float]:
     """Least clearance of each body from each ball, sampled."""
     arm, found = asked.manipulator, {}
@@ -431,6 +445,7 @@ def judge_random(seed: int, folder: Path) -> Verdict:
     found = files.verify()
     rows, asked = found.trajectory, found.problem
     least = sampled(asked, rows, np.linspace(0.0, rows.n_samples - 1, 41))
+    check_stations(asked, rows, found)
     for k, pair in enumerate(found.pairs):
         if pair.obstacle and least[pair.own, pair.obstacle] > 0.0:
             assert found.least.lower[k] <= least[pair.own, pair.obstacle] + 3e-6

@@ -16,6 +16,9 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import Pointing, angles_between
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.time_limit import NO_LIMIT
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification import pointing as judging
 from vdsm_pin.verification.pointing import check_pointing
 from vdsm_pin.verification.records import Check, Verdict
 
@@ -251,3 +254,31 @@ def test_a_target_within_reach_of_the_errors_is_never_green() -> None:
     assert row.verdict is Verdict.CERTIFIED
     (row,) = check_pointing(task, told, errors=ErrorBox(base=1.0))
     assert row.verdict is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bound_beyond_the_cone_is_never_green(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With few halvings the angles seen under errors keep a cone, their bound not."""
+    monkeypatch.setattr(judging, "ROUNDS", 3)
+    rng, box = np.random.default_rng(seed), ErrorBox(joint=0.0005)
+    (told, tips), count = motion(rng, 12, 0.05, 0.01), 0
+    for looks in pointings(rng, tips):
+        task = asked(tips, replace(looks, cone=1.5))
+        (nominal, _), (erring, _) = (
+            judging._largest(task, told, errors, NO_LIMIT)
+            for errors in (ErrorBox(), box)
+        )
+        least = max(nominal.bound, erring.seen)
+        if not least < erring.bound < 1.4:
+            continue
+        count += 1
+        cone = (least + erring.bound) / 2.0 - TOLERANCES.joint_limit
+        tight = replace(task.path, pointing=replace(looks, cone=cone))
+        tight = replace(task, tip_path=tight)
+        (row,) = judging.check_pointing(tight, told)
+        assert row.verdict is Verdict.CERTIFIED
+        (row,) = judging.check_pointing(tight, told, errors=box)
+        assert row.verdict is Verdict.UNDECIDED
+    assert count
