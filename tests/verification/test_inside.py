@@ -99,6 +99,16 @@ def certificate(folder: Path, corners: FloatArray, solid: bool | None) -> Path:
     return path
 
 
+def check_accepted(folder: Path, problem: Path, rows: Path) -> None:
+    """The motion is certified, and the checker accepts its certificate."""
+    file, found = verified(problem, rows)
+    assert found.verdict is Verdict.CERTIFIED
+    proof = folder / "c.certificate"
+    write_certificate(proof, found, Hashes(file.sha256, sha256(rows.read_bytes())))
+    outcome = check_certificate(proof, problem, rows)
+    assert outcome.accepted, outcome.reason
+
+
 def start_of(file: PlanningProblem) -> str:
     """What a planner says of the start."""
     try:
@@ -408,12 +418,7 @@ def test_a_link_that_is_not_held_off_a_mesh_may_begin_within(tmp_path: Path) -> 
     asked = json.loads(path.read_text())
     asked["manipulator"]["ignore_pairs"] = [["link 1", "housing"]]
     path.write_text(json.dumps(asked))
-    file, found = verified(path, rows)
-    assert found.verdict is Verdict.CERTIFIED
-    proof = tmp_path / "c.certificate"
-    write_certificate(proof, found, Hashes(file.sha256, sha256(rows.read_bytes())))
-    outcome = check_certificate(proof, path, rows)
-    assert outcome.accepted, outcome.reason
+    check_accepted(tmp_path, path, rows)
 
 
 def test_a_closed_path_may_be_drawn_on_without_leaving_it(tmp_path: Path) -> None:
@@ -431,9 +436,4 @@ def test_a_closed_path_may_be_drawn_on_without_leaving_it(tmp_path: Path) -> Non
         for k, s in enumerate(stations)
     ]
     rows.write_text("\n".join([header, *lines, ""]))
-    file, found = verified(path, rows)
-    assert found.verdict is Verdict.CERTIFIED
-    proof = tmp_path / "c.certificate"
-    write_certificate(proof, found, Hashes(file.sha256, sha256(rows.read_bytes())))
-    outcome = check_certificate(proof, path, rows)
-    assert outcome.accepted, outcome.reason
+    check_accepted(tmp_path, path, rows)
