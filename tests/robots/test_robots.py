@@ -126,6 +126,20 @@ def test_without_a_pair_to_check_nothing_is_green(tmp_path: Path) -> None:
     assert bad[0].where.startswith("no pair to check")
 
 
+def test_a_shape_that_coal_cannot_take_is_named(tmp_path: Path) -> None:
+    """A flat hull, of which Coal measures nothing, beside others, which it does."""
+    plate = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0.1 0.1 0\nf 1 2 3\nf 2 4 3\n"
+    write(tmp_path, "plate.obj", plate)
+    mesh = '<mesh filename="plate.obj"/>'
+    text = URDF.replace('<cylinder radius="0.05" length="0.2"/>', mesh)
+    urdf = RobotFiles(write(tmp_path, "two.urdf", text))
+    cell = cell_of(urdf, write(tmp_path, "s.yaml", SCENE))
+    found = verify_robot(cell, Motion(np.array([[0.0, 0.0], [1.0, 0.1]])))
+    (row,) = [check for check in found.checks if "Coal" in check.name]
+    assert row.verdict is Verdict.CERTIFIED
+    assert row.where.endswith("; none of 'hand', whose shape Coal cannot take")
+
+
 def test_a_robot_of_which_nothing_moves_is_judged_where_it_stands(
     tmp_path: Path,
 ) -> None:

@@ -174,4 +174,6 @@ def _coal(
         worst = measured[np.argmax(off[measured])]
         evidence.add(float(off[worst]), "", float(moments[worst]))
     where = f"{evidence.count} of {len(cell.pairs)} pairs measured"
-    return evidence.check(f"{where}, each where it was found nearest"), found
+    untold = cell.coal.untold([body.name for body in cell.bodies])
+    note = f"{where}, each where it was found nearest{untold}"
+    return evidence.check(note), found

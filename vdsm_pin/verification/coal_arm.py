@@ -121,6 +121,11 @@ class CoalArm:
         near = np.flatnonzero(self._column >= 0)
         self._number[self.pairs.one[near], self._column[near]] = near
 
+    @property
+    def untold(self) -> str:
+        """Which bodies Coal says nothing of, in words; "" where there is none."""
+        return self._shapes.untold(self.pairs.names)
+
     def near(
         self,
         trajectory: Trajectory,

@@ -162,7 +162,7 @@ def check_coal(
         k = int(np.argmax(excess))
         evidence.add(float(excess[k]), _words(arm, found, k), float(found.moment[k]))
     total = arm.pairs.one.size * trajectory.n_samples
-    note = f"; {evidence.count} of {total} pairs measured"
+    note = f"; {evidence.count} of {total} pairs measured{arm.untold}"
     if proved is None:
         note += "; against brackets of the rows alone"
     return (evidence.check(note),)

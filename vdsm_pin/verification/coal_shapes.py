@@ -101,6 +101,12 @@ class CoalShapes:
         self._bodies, self._frames = bodies, np.array(frames, np.int64)
         self._parts = _Parts.of(bodies)
 
+    def untold(self, names: Sequence[str]) -> str:
+        """Which bodies, by the names of all, Coal says nothing of; "" where it does."""
+        silent = (k for k, body in enumerate(self._bodies) if body is None)
+        which = ", ".join(f"'{names[k]}'" for k in silent)
+        return f"; none of {which}, whose shape Coal cannot take" if which else ""
+
     def distances(self, poses: FloatArray, sides: Sides) -> Distances:
         """Coal's distance of each pair.
 
