@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from oracles.certificate_oracle import CannotCertify, OracleWriter, sealed
+
+from vdsm_pin.certificate_checker import Outcome, check_certificate, claims
 
 SHAPES = (
     "cylinder",
@@ -22,6 +25,9 @@ SHAPES = (
     "mesh_obj",
 )
 NOTCHED = [[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]]
+ROUNDED = 3e-10
+"""Of a claim, a whole number of 1e-10 m, and of what the prover keeps to spare; [m]."""
+
 CUBE = [(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
 CUBE_FACES = [
     *[(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)],
@@ -34,6 +40,31 @@ def certificate_lines(path: Path) -> list[Any]:
     return [
         json.loads(line) for line in gzip.decompress(path.read_bytes()).splitlines()
     ]
+
+
+def accepted_closely(*files: Path, most: float = ROUNDED) -> Outcome:
+    """A certificate is accepted, and no plane proves more than it claims.
+
+    Verifier and checker work out by code of their own what a plane proves.
+
+    Args:
+        files: Certificate, problem and trajectory.
+        most: What may be between the two; [m].
+    """
+    spared, kept = list[float](), claims.clearances
+
+    def clearances(pair: Any, planes: list[claims.Plane], slices: Any) -> Any:
+        proved = kept(pair, planes, slices)
+        spared.extend(proved - [plane.lower for plane in planes])
+        return proved
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(claims, "clearances", clearances)
+        outcome = check_certificate(*files)
+    assert outcome.accepted, outcome.reason
+    assert len(spared) == outcome.n_claims
+    assert max(spared, default=0.0) <= most
+    return outcome
 
 
 def write_cube(path: Path, half: float, *, skip: int = 0) -> None:
