@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flint import arb, ctx
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
@@ -51,6 +52,39 @@ def judged(problem: PlanningProblem, motion: Trajectory) -> Verification:
 def clearance(found: Verification) -> tuple[Verdict, float, float]:
     row = next(c for c in found.checks if c.name == "clearance from obstacles")
     return row.verdict, row.worst, row.moment
+
+
+# ---- many turns, from which little is left ----
+
+
+@pytest.mark.parametrize(
+    "first, last",
+    [(999_999_999_983, 999_999_999_983), (-1e12 + 17, -1e12 + 40), (0, 1e9), (7, 1e12)],
+)
+@pytest.mark.parametrize("moment", [0.3, 0.7123])
+def test_brackets_hold_the_clearance_of_what_turns_many_times(
+    first: float, last: float, moment: float, tmp_path: Path
+) -> None:
+    """A ball on a lever about the middle of the arm; the truth by 300 bits."""
+    obstacle = (
+        "  - {name: ball, shape: sphere, center: [300, 100, 0], radius: 10, motion: "
+        "{times_s: [0, 1], positions: [[450, 0, 0], [450, 0, 0]], "
+        f"rpy_deg: [[0, 0, {first}], [0, 0, {last}]]}}}}\n"
+    )
+    problem = problem_of(tmp_path / "p.yaml", obstacle, required=0.0)
+    times = np.array([moment, np.nextafter(moment, 1.0)])
+    found = judged(problem, motion_of(STRAIGHT, times)).closest(1)[0]
+    with ctx.workprec(300):
+        truth = []
+        for time in times.tolist():
+            begin, end = arb(float(first)), arb(float(last))
+            angle = (begin + (end - begin) * arb(time)) * arb.pi() / 180
+            x = 450 + 300 * angle.cos() - 100 * angle.sin()
+            y = 300 * angle.sin() + 100 * angle.cos()
+            beyond = abs(x - 450) - 450  # of the axis, which is 900 mm long
+            off = (y**2 + beyond.max(arb(0)) ** 2).sqrt() - 50
+            truth.append(float(off / 1000))
+    assert found.lower <= min(truth) <= found.upper
 
 
 # ---- a ball that meets a capsule -----------------------------------------------------

@@ -29,6 +29,8 @@ def rigid_carrier(
 ) -> Carrier:
     """A frame that goes straight in (x, y, z, roll, pitch, yaw) from knot to knot.
 
+    Whole turns that an angle has at the first knot are taken off all of them, exactly.
+
     Args:
         model: Its knots.
         frame: The file's unit and base.
@@ -55,7 +57,8 @@ def rigid_carrier(
             problem = f"has {len(rows)} rows, expected {len(times)}, one for each time"
             raise document.invalid((*at, name), problem)
     places = _rows(model.positions, len(times)) - frame.origin
-    turns = np.deg2rad(_rows(model.rpy_deg, len(times)))
+    turns = _rows(model.rpy_deg, len(times))
+    turns = np.deg2rad(turns - (turns[0] - np.fmod(turns[0], 360.0)))
     knots = np.hstack([frame.metres(places), turns[:, ::-1]])
     return Carrier(placed(free_tree(), frame), Path(knots, times=times))
 

@@ -16,7 +16,7 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.proving import Proving, new_proving
 from vdsm_pin.proof.rough import with_rough
 from vdsm_pin.proof.terms import Task
-from vdsm_pin.proof.tree import Tree
+from vdsm_pin.proof.tree import Tree, added_up
 
 
 @dataclass(frozen=True)
@@ -82,11 +82,8 @@ class Question:
                 f"the path has {path.knots.shape[1]} columns, the tree {tree.n_columns}"
             )
             raise ValueError(message)
-        reach, extent = path.reach, self.extent
-        for joint in tree.joints:
-            if joint.column is not None:
-                extent += abs(joint.ratio) * float(reach[joint.column])
-        rules = budget.rules(rounding_pad(extent))
+        reach = path.reach
+        rules = budget.rules(rounding_pad(self.extent + added_up(tree.joints, reach)))
         task = for_motion(self.task, tree, reach, rules)
         asked = with_errors(task, self.errors), path.packed(), self.n_columns
         return new_proving(*asked, self.plan.n_obstacles, budget)

@@ -16,6 +16,7 @@ Readers of robots build on it: `Joint`, `Tree`, `shifted`, `free_tree` and their
 arguments are kept stable.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Final
@@ -211,6 +212,17 @@ def _motions(joint: Joint, values: FloatArray) -> FloatArray:
         sine, rest = np.sin(values)[:, None, None], 1.0 - np.cos(values)[:, None, None]
         motion[:, :3, :3] += sine * cross + rest * (cross @ cross)
     return motion
+
+
+def added_up(joints: Iterable[Joint], reach: FloatArray) -> float:
+    """What joints come to where each is as far as it gets; [m], [rad].
+
+    Args:
+        joints: Of one tree.
+        reach: How large each column of q gets, shape (n_columns,).
+    """
+    moved = (one for one in joints if one.column is not None)
+    return sum(abs(one.ratio) * float(reach[one.column]) for one in moved)
 
 
 def free_tree() -> Tree:

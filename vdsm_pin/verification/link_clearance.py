@@ -19,7 +19,9 @@ from vdsm_pin.proof.budget import rounding_pad
 from vdsm_pin.tolerances import TOLERANCES
 
 
-def arithmetic_pad(problem: PlanningProblem, pieces: PackedPieces) -> float:
+def arithmetic_pad(
+    problem: PlanningProblem, pieces: PackedPieces, beside: float = 0.0
+) -> float:
     """Bound of all rounding in one clearance evaluation for this problem; [m].
 
     `TOLERANCES.arithmetic` holds within `TOLERANCES.scene_extent`; rounding grows in
@@ -28,9 +30,10 @@ def arithmetic_pad(problem: PlanningProblem, pieces: PackedPieces) -> float:
     Args:
         problem: The arm.
         pieces: The scene.
+        beside: What joints that carry obstacles add up to; [m], [rad].
     """
     arm = problem.manipulator
-    largest = max(arm.total_length, *np.abs(arm.base_range))
+    largest = max(beside, arm.total_length, *np.abs(arm.base_range))
     for values in (pieces.points, pieces.centre, pieces.radius, pieces.extent):
         largest = max(largest, np.abs(values).max(initial=0.0))
     return rounding_pad(float(largest))

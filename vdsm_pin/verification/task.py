@@ -20,6 +20,7 @@ from vdsm_pin.proof.error_box import ErrorBox as ProofBox
 from vdsm_pin.proof.packing import pack_task
 from vdsm_pin.proof.packing import with_errors as with_box
 from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.tree import added_up
 from vdsm_pin.verification.link_clearance import arithmetic_pad
 from vdsm_pin.verification.moving import joined_tree, obstacle_frames
 from vdsm_pin.verification.records import Pair
@@ -174,8 +175,9 @@ def make_task(
     columns = arm.n_links + np.arange(len(bodies))
     # The feed counts as what link 1 is mounted on.
     columns[len(obstacles) :] = [max(0, body.link - 1) for body in table.bodies]
-    rules = (budget or Budget()).rules(arithmetic_pad(problem, pieces))
     tree, numbers = joined_tree(own, problem.scene), table.numbers()
+    beside = 0.0 if reach is None else added_up(tree.joints[len(own.joints) :], reach)
+    rules = (budget or Budget()).rules(arithmetic_pad(problem, pieces, beside))
     task = pack_task(tree, bodies, numbers, rules, reach, columns, pieces)
     return with_errors(task, problem, errors)
 
