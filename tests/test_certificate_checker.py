@@ -269,6 +269,8 @@ def test_what_is_not_known_is_refused(tmp_path: Path) -> None:
     case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
     more = edited(case, lambda lines: lines[0].update(coverage=1.0))
     assert "has other keys" in refused(case, sealed(more))
+    outcome = judge(case)
+    assert outcome.n_intervals == outcome.n_claims == 0
 
 
 @pytest.mark.parametrize(("on_path", "good"), [([0, 1], True), ([0, 0], False)])

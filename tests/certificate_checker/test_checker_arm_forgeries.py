@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from oracles.arm_certificates import ERRORS, HELPER, MATE, OBSTACLES, MadeArm
 from oracles.certificate_cases import write_cube
 from oracles.certificate_mutations import numbers_in, place
@@ -36,6 +37,58 @@ def made_in(folder: Path, scene: str, smooth: bool = False) -> MadeArm:
 @pytest.mark.parametrize("scene", SCENES)
 def test_two_programs_prove_the_same(scene: str, smooth: bool, tmp_path: Path) -> None:
     assert made_in(tmp_path, scene, smooth).certified()
+
+
+def two_cubes(path: Path) -> None:
+    """Apart from one another, in one STL file."""
+    write_cube(path, 10.0)
+    mesh = trimesh.load_mesh(path)
+    other = mesh.copy().apply_translation([50.0, 5.0, 0.0])
+    trimesh.util.concatenate([mesh, other]).export(path)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "more"),
+    [
+        (two_cubes, {"parts": 5}),
+        (two_cubes, {"parts": 3, "solid": False}),
+        (lambda path: write_cube(path, 20.0, skip=1), {"parts": 4}),
+        (lambda path: write_cube(path, 20.0, skip=5), {"parts": 1}),
+    ],
+)
+def test_meshes_on_links_are_covered_by_the_same_hulls(
+    mesh: Callable[[Path], None], more: dict[str, Any], tmp_path: Path
+) -> None:
+    made = made_in(tmp_path, "errors")
+    made.data["manipulator"]["bodies"][1] |= more
+    mesh(tmp_path / "valve.stl")
+    assert made.certified()
+
+
+AROUND: dict[str, dict[str, Any]] = {
+    "all that moves": {"center": [0, 0, 0], "half": 3000}
+    | {"motion": {"times_s": [0, 2], "positions": [[100, 50, 20], [90, 60, 20]]}},
+    "all but link 1": {"center": [1000, 0, 0], "half": 600},
+    "the camera": {"center": [650, 200, 10], "half": 60},
+}
+
+
+@pytest.mark.parametrize("what", AROUND)
+def test_what_is_inside_of_a_mesh_is_refused(what: str, tmp_path: Path) -> None:
+    """A certificate of the surface alone is none of the solid."""
+    shell = {"name": "shell", "shape": "mesh", "file": "shell.stl", "solid": False}
+    shell |= {"check_size": False, "rpy_deg": [0, 0, 5]} | AROUND[what]
+    write_cube(tmp_path / "shell.stl", float(shell.pop("half")))
+    made = MadeArm(tmp_path, obstacles=[shell], base={"position": [0, 0, 0]})
+    arm, motion = made.data["manipulator"], made.motions["t.csv"]
+    arm["bodies"][0]["center"][1] = 200
+    if what == "all but link 1":
+        arm["ignore_pairs"].append(["link 1", "shell"])
+    still = replace(motion, x0=0 * motion.x0, alpha=0 * motion.alpha)
+    made.motions["t.csv"] = replace(still, theta=0 * motion.theta)
+    lines = made.certified()
+    made.data["obstacles"][0]["solid"] = True
+    assert "not proved outside shell" in made.check(lines).reason
 
 
 NOT_TIGHT = {

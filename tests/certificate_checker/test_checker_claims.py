@@ -65,9 +65,36 @@ def test_a_direction_that_is_none_is_refused(length: float) -> None:
         0.0,
         0.0,
     )
-    plane = Plane("", slices_of(interval), 0, 1, (0.0, length, 0.0), 0.0)
+    planes = [
+        Plane("", slices_of(interval), 0, 1, (0.0, y, 0.0), 0.0) for y in (1.0, length)
+    ]
     with pytest.raises(Rejected, match="a direction has no length"):
-        clearances(pair, [plane], Slices(tree, [slices_of(interval)]))
+        clearances(pair, planes, Slices(tree, [slices_of(interval)]))
+
+
+@pytest.mark.parametrize(("off", "good"), [(0.9e-9, True), (1.1e-9, False)])
+@pytest.mark.parametrize("axis", range(3))
+def test_a_half_space_has_one_direction(axis: int, off: float, good: bool) -> None:
+    """It may be off by 1e-9 a coordinate; what is proved is of the exact one."""
+    tree = Tree([Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 1.0, 0.0))])
+    interval = Interval(tree, [[arb(0), arb(0)]])
+    floor = Solid("floor", [[[0.0, 0.0, -2.0]]])
+    floor.normal = np.array([0.48, 0.6, 0.64])
+    pair = Pair(Body(1, Solid("a", [[[9.0, 0.0, 0.0]]])), floor, 0, 0.0, 0.0)
+    exact = -floor.normal
+    n = exact.copy()
+    n[axis] += off
+    n[axis - 1] -= off * exact[axis] / exact[axis - 1]  # as long to the first order
+    if abs(exact[axis]) > abs(exact[axis - 1]):
+        n = exact + (n - exact) * exact[axis - 1] / exact[axis]
+    planes = [Plane("", slices_of(interval), 0, 1, tuple(x), 0.0) for x in (exact, n)]
+    slices = Slices(tree, [slices_of(interval)])
+    if good:
+        alike = clearances(pair, planes, slices)
+        assert alike[0] == alike[1]
+    else:
+        with pytest.raises(Rejected, match="n is not the half-space's -normal"):
+            clearances(pair, planes, slices)
 
 
 def test_names_are_ignored_in_either_order_with_all_their_parts() -> None:

@@ -132,23 +132,33 @@ def edited(case: Case, change: Any) -> str:
 
 
 @pytest.mark.parametrize(("past", "good"), [(0.9e-9, True), (2e-9, False)])
+@pytest.mark.parametrize("link", [1, 2, 3])
 @pytest.mark.parametrize("column", range(5))
 def test_a_limit_is_kept_to_a_billionth(
-    column: int, past: float, good: bool, tmp_path: Path
+    column: int, link: int, past: float, good: bool, tmp_path: Path
 ) -> None:
-    """Rail, yaw, pitch, and yaw and pitch of which the link turns by their sum."""
+    """Rail, yaw, pitch, and yaw and pitch of which a link turns by their sum."""
     data = {"vdsm_problem": 1, "length_unit": "m", "obstacles": []}
     data |= {"required_clearance": 0.0, "manipulator": ARM | {"base_range": [-1, 1]}}
-    q, most = np.zeros((2, 7)), np.deg2rad(50)
-    if column < 3:
-        q[1, column] = (1.0 if column == 0 else most) + past
+    q, most, yaw = np.zeros((2, 7)), np.deg2rad(50), np.deg2rad(40)
+    both, told = q[1, 2 * link - 1 : 2 * link + 1], 1000.0
+    if column == 0:
+        q[1, 0] = 1.0 + past
+    elif column < 3:
+        both[column - 1], told = most + past, 50.0
     else:
-        yaw = np.deg2rad(40)
-        q[1, 1:3] = yaw, np.arccos(np.cos(np.deg2rad(60) + past) / np.cos(yaw))
-        q[1, 1:3] = q[1, 1:3] if column == 3 else -q[1, 2:0:-1]
+        both[:], told = (
+            (yaw, np.arccos(np.cos(np.deg2rad(60) + past) / np.cos(yaw))),
+            60,
+        )
+        both[:] = both if column == 3 else -both[::-1]
     found = refusal(Case(tmp_path, data, q, (0.0, 0.0, 0.0)))
-    name = ("x0", "alpha1", "theta1", "psi1", "psi1")[column]
-    assert found == "" if good else found.startswith(f"interval 0: {name} is")
+    name = ("x0", "alpha", "theta", "psi", "psi")[column] + str(link) * (column > 0)
+    if good:
+        assert found == ""
+    else:
+        assert found.startswith(f"interval 0: {name} is ")
+        assert float(found.split()[-2]) == pytest.approx(told, rel=1e-8)
 
 
 @pytest.mark.parametrize(("less", "good"), [(0.0, True), (1e-12, False)])
@@ -203,17 +213,35 @@ def test_slices_and_intervals_are_no_more_than_asked(tmp_path: Path) -> None:
     assert more == "interval 1: lies beyond the last row"
 
 
-def test_a_change_is_counted_from_the_row_before(tmp_path: Path) -> None:
+@pytest.mark.parametrize("column", range(7))
+def test_a_change_is_counted_from_the_row_before(column: int, tmp_path: Path) -> None:
+    """Of every joint that turns; the base may go as far as it likes."""
     q = np.zeros((2, 7))
-    q[:, 2] = -0.01, 0.01
+    q[:, column] = -0.01, 0.01
     data = {"vdsm_problem": 1, "length_unit": "m", "manipulator": ARM}
     data |= {"obstacles": [], "required_clearance": 0.0}
-    for limit, good in ((1.2, True), (1.1, False)):
+    for limit, good in ((1.2, True), (1.1, column == 0)):
         asked = data | {"max_change_per_row_deg": limit}
         found = refusal(Case(tmp_path, asked, q, (0.0, 0.0, 0.0)))
         assert found == (
             "" if good else "interval 0: a joint turns by 1.14591559026 deg"
         )
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_joints_at_the_goal_are_judged_one_by_one(first: int, tmp_path: Path) -> None:
+    """One is off by too much, and the next the other way: the tip is not."""
+    goal = {"x0": 0.1, "alpha_deg": [40, 0, 0], "theta_deg": [0, 0, 0]}
+    data = {"vdsm_problem": 1, "length_unit": "m", "manipulator": ARM}
+    data |= {"obstacles": [], "required_clearance": 0.0, "goal": {"joints": goal}}
+    for off, good in ((0.95e-6, True), (1.05e-6, False)):
+        q = np.zeros((2, 7))
+        q[:, 0], q[:, 1] = 0.1, np.deg2rad(40)
+        q[:, 1 + first] += off
+        q[:, 3 + first] -= 0.95e-6
+        found = refusal(Case(tmp_path, data, q, (0.0, 0.0, 0.0)))
+        assert (found == "") is good
+        assert good or "off their goal" in found
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])

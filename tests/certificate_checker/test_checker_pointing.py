@@ -13,9 +13,9 @@ from oracles.certificate_oracle import sealed, sha256
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate
-from vdsm_pin.certificate_checker.balls import norm
+from vdsm_pin.certificate_checker.balls import SLACK, norm
 from vdsm_pin.certificate_checker.path import Drawing
-from vdsm_pin.certificate_checker.rows import PARTS
+from vdsm_pin.certificate_checker.rows import PARTS, Rows
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -30,6 +30,9 @@ ARM = built_in("hrm8")
 NO_ERRORS = ErrorBox()
 STEADY = 0.02
 """Turn of a joint from row to row; [rad]."""
+
+BEHIND = -0.3
+"""Where the base then stands; [m]."""
 
 
 class Looking:
@@ -47,11 +50,11 @@ class Looking:
         x0 = 0.002 * rng.uniform(0.0, 1.0, rows).cumsum()
         rates = 1e-4 * rng.normal(size=(rows, 1 + 2 * ARM.n_links))
         if steady:
-            angles, x0, rates = 0.0 * angles, 0.0 * x0, 0.0 * rates
+            angles, x0, rates = 0.0 * angles, 0.0 * x0 + BEHIND, 0.0 * rates
             angles[0, :, 0] = STEADY * np.arange(rows)
             rates[:, 1] = STEADY
         centres = joint_centres(ARM, x0, *angles)
-        self.tips = centres[:, -1]
+        self.tips, self.centres = centres[:, -1], centres
         gaps = np.linalg.norm(np.diff(self.tips, axis=0), axis=1)
         on, more = np.ones(rows, dtype=np.bool_), {}
         if smooth:
@@ -189,3 +192,58 @@ def test_what_moves_far_away_turns_no_look(kind: str, tmp_path: Path) -> None:
         case.ask(cone, kind, [ball])
         case.forge()
         assert (case.reason() == "") is good
+
+
+def bound(case: Looking, kind: str, k: int, errors: ErrorBox) -> float:
+    """What docs/certificate.md reckons of an interval of a steady motion; [rad]."""
+    tips, length, aims = case.tips[k : k + 2], float(ARM.total_length), case.aims[kind]
+    axes = case.centres[k : k + 2, -1] - case.centres[k : k + 2, -2]
+    if kind == "target":
+        wanted, way = aims - tips, length * STEADY
+    elif kind == "direction":
+        wanted, way = np.array([aims, aims]) / np.linalg.norm(aims), 0.0
+    else:
+        every = aims / np.linalg.norm(aims, axis=1, keepdims=True)
+        sides = np.linalg.norm(np.diff(case.tips, axis=0), axis=1)
+        steepest = np.linalg.norm(np.diff(every, axis=0), axis=1) / sides
+        wanted, way = every[k : k + 2], steepest.max() * sides[k]
+    across = np.linalg.norm(np.cross(axes, wanted), axis=1)
+    seen = np.arctan2(across, (axes * wanted).sum(axis=1)).mean()
+    away = np.linalg.norm(wanted, axis=1).mean() - way / 2.0
+    turn = 2.0 * np.arccos(np.cos(errors.joint / 2.0) ** 2)
+    behind = length - np.append(0.0, np.cumsum(ARM.link_lengths[:-1]))
+    moved = (
+        errors.base + errors.base_turn * (abs(BEHIND) + length) + turn * behind.sum()
+    )
+    moved = moved if kind == "target" else 0.0
+    astray = errors.base_turn + len(behind) * turn + moved / (away - moved)
+    return float(seen + STEADY / 2.0 + way / away / 2.0 + astray)
+
+
+@pytest.mark.parametrize("kind", ["target", "direction", "directions"])
+@pytest.mark.parametrize(
+    "errors",
+    [NO_ERRORS, ErrorBox(joint=1e-3, base=0.02, base_turn=3e-3)],
+    ids=["none", "all"],
+)
+def test_an_interval_is_halved_only_where_its_bound_is_beyond_the_cone(
+    kind: str, errors: ErrorBox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the formula of the docs: angles at both ends, five rows, four intervals."""
+    case = Looking(tmp_path, 0, steady=True)
+    case.ask(40.0, kind)
+    case.look(errors)
+    kept, ends = Rows._seen, []
+
+    def seen(self: Rows, *taken: Any) -> Any:
+        ends.append(taken[2])
+        return kept(self, *taken)
+
+    monkeypatch.setattr(Rows, "_seen", seen)
+    worst = max(bound(case, kind, k, errors) for k in range(4))
+    for more, whole in ((2e-9, True), (-2e-9, False)):
+        ends.clear()
+        case.ask(float(np.rad2deg(worst - SLACK + more)), kind)
+        case.forge()
+        assert case.reason() == ""
+        assert (len(ends) == 2 * (5 + 4)) is whole

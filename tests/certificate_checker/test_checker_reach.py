@@ -1,17 +1,23 @@
 """How far the checker takes a point to reach in a slice, by the formula of the docs."""
 
+from itertools import pairwise
 from math import cos, sin
+from typing import Any
 
 import numpy as np
 import pytest
 from flint import arb
 
+from vdsm_pin.certificate_checker.balls import Ball, column, norm
 from vdsm_pin.certificate_checker.motion import Branch, Interval, Slices
-from vdsm_pin.certificate_checker.solids import Body, Solid
-from vdsm_pin.certificate_checker.tree import TURNS, Joint, Tree
+from vdsm_pin.certificate_checker.solids import Body, Solid, away
+from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
 
 LEVER = 0.7
 """Of the point about the joint; [m]."""
+
+HIGH = 3.0
+"""How high the joint stands, which no height along y depends on; [m]."""
 
 
 def reached(
@@ -19,19 +25,22 @@ def reached(
     errors: tuple[float, float, float],
     disc: float = 0.0,
     share: float = 1.0,
-) -> float:
+) -> tuple[float, float]:
     """Largest y of a point on the x axis that turns about z, errors included; [m].
 
-    It turns by `width` in a slice that is the first `share` of an interval.
+    It turns by `width` in a slice that is the first `share` of an interval. Then the
+    size of all that this is made of.
     """
-    joint = Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 1.0, 0.0), errors)
+    place = np.eye(4)
+    place[2, 3] = HIGH
+    joint = Joint(0, TURNS, (0, 0, 1), place, (0, 1.0, 0.0), errors)
     tree = Tree([joint])
     interval = Interval(tree, [[arb(0), arb(width / share)]])
     slices = Slices(tree, [(interval, 0.0, share)])
     point = Solid("point", [[[LEVER, 0.0, 0.0]]], disc=((1.0, 0.0, 0.0), disc))
     body, at = Body(1, point), np.zeros(1, np.int64)
-    found, _ = slices.reach(body, 0, at, np.array([[0.0, 1.0, 0.0]]))
-    return float(found[0])
+    found, size = slices.reach(body, 0, at, np.array([[0.0, 1.0, 0.0]]))
+    return found.item(), size.item()
 
 
 @pytest.mark.parametrize("width", [0.0, 0.1, 0.8])
@@ -49,9 +58,10 @@ def test_reach_is_that_of_the_docs(
     drift, second = far * error * width / 2.0, far * turned**2 / 2.0
     moved = error * LEVER * (1.0 + cos(width)) / 2.0 + tilt * LEVER
     heights = max(disc, end)
-    expected = heights + bend + drift + second + disc * turned + moved
-    found = reached(width, (error, 0.0, tilt), disc, share)
-    assert found == pytest.approx(expected, rel=1e-12)
+    more = bend + drift + second + disc * turned + moved
+    found, size = reached(width, (error, 0.0, tilt), disc, share)
+    assert found == pytest.approx(heights + more, rel=1e-12)
+    assert size == pytest.approx(HIGH + far + more + far * turned, rel=1e-12)
 
 
 @pytest.mark.parametrize("width", [0.1, 0.8])
@@ -59,7 +69,7 @@ def test_reach_is_that_of_the_docs(
 def test_reach_is_an_upper_bound(width: float, error: float) -> None:
     """Of the exact motion within the errors, at many moments."""
     angles = np.linspace(0.0, width, 101)[:, None] + np.linspace(-error, error, 21)
-    assert (LEVER * np.sin(angles)).max() <= reached(width, (error, 0.0, 0.0))
+    assert (LEVER * np.sin(angles)).max() <= reached(width, (error, 0.0, 0.0))[0]
 
 
 @pytest.mark.parametrize("inner", [2, 4])
@@ -80,3 +90,40 @@ def test_rates_of_a_part_are_those_within_it(part: tuple[float, float]) -> None:
     end = part[1]
     (found,) = interval.rates(*part)
     assert found == pytest.approx([6.0 * end**2, 12.0 * end, 12.0], rel=1e-11)
+
+
+def exact(point: Any) -> Ball:
+    """The length of a vector of doubles."""
+    return norm(column(*point.tolist()))
+
+
+def test_bounds_lie_above_what_rounding_loses_of_them() -> None:
+    """In balls: lengths, errors, values and rates that planes are worked out of."""
+    rng = np.random.default_rng(3)
+    for kind in (TURNS, SLIDES):
+        place, axis = np.eye(4), rng.normal(size=3)
+        place[:3, 3] = rng.normal(size=3)
+        value, moved, tilt, offset = rng.uniform(0.1, 1.0, 4)
+        made = Joint(0, kind, axis, place, (0, -2.0, offset), (value, moved, tilt))
+        assert arb(made.lever) > exact(place[:3, 3])
+        assert made.past > offset
+        assert made.tilt > tilt
+        assert made.turn_error > value if kind == TURNS else made.turn_error == 0.0
+        least = arb(moved) + (arb(value) if kind == SLIDES else 0)
+        assert arb(made.slip) > least
+        points = [arb(x) for x in rng.normal(size=4)]
+        (found,) = Interval(Tree([made]), [points]).rates(0.0, 1.0)
+        steps = [b - a for a, b in pairwise(points)]
+        twice = [6 * (b - a) for a, b in pairwise(steps)]
+        for bound, values in zip(
+            found, (points, [3 * x for x in steps], twice), strict=True
+        ):
+            more = arb(offset) if values is points else arb(0)
+            assert all(arb(bound) > abs(2 * x) + more for x in values)
+    corners = rng.normal(size=(1, 8, 3))
+    solid = Solid("hull", corners, disc=((1.0, 0.0, 0.0), 0.25))
+    levers = zip(solid.levers.tolist(), corners[0], strict=True)
+    assert all(arb(far) > exact(point) + arb(0.25) for far, point in levers)
+    corners[0] -= (corners[0].min(axis=0) + corners[0].max(axis=0)) / 2.0
+    corners[0, :2] = [-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]  # their middle is 0
+    assert arb(away(corners[0] / 8.0, 0.5)) > exact(corners[0, 1]) / 8 + arb(0.5)

@@ -132,6 +132,55 @@ def test_motions_of_few_rows_are_accepted_and_held_to_their_rates(
     assert rows == 1 or "the limit of its rates" in outcome.reason
 
 
+def timed(folder: Path, smooth: int) -> Made:
+    """Rows at moments that do not begin at 0, of which the last way is the fastest."""
+    made = Made(folder, "fixed", smooth)
+    rows = np.array([[0, 0.01, 0], [0.1, 0.1, 0.1], [0.2, 0.2, 0.1]])
+    rest = np.zeros((3, 3 * smooth))
+    times = np.array([[5.0], [7.0], [7.5]])
+    if not smooth:
+        made.rows[0].append("time_s")
+    made.rows[1:] = np.hstack([rows, times, rest]).tolist()
+    return made
+
+
+@pytest.mark.parametrize(("smooth", "peak"), [(0, 0.2), (1, 0.3), (2, 0.375)])
+def test_rates_are_per_second_wherever_the_clock_begins(
+    tmp_path: Path, smooth: int, peak: float
+) -> None:
+    """0.1 m in 0.5 s: evenly, or by a piece that is 3/2 or 15/8 as fast inside."""
+    made = timed(tmp_path, smooth)
+    lines, urdf = made.certified(), made.texts["all.urdf"]
+    for share, good in ((1.0 + 1e-8, True), (1.0 - 1e-8, False)):
+        made.texts["all.urdf"] = urdf
+        text('velocity="0.5"', f'velocity="{share * peak!r}"')(made)
+        outcome = made.check(copy.deepcopy(lines))
+        assert outcome.accepted is good
+        assert good or "the limit of its rates" in outcome.reason
+
+
+@pytest.mark.parametrize(
+    ("smooth", "peak"), [(0, None), (1, 2.4), (2, 2.3094010767585)]
+)
+def test_accelerations_keep_their_limits(
+    tmp_path: Path, smooth: int, peak: float | None
+) -> None:
+    """Of the same piece, 6 or 10 / sqrt(3) times 0.1 m a square of its time.
+
+    Straight lines have none at their corners, so they keep no limit.
+    """
+    made = timed(tmp_path, smooth)
+    lines = made.certified()
+    made.cell["robot"] |= {"joint_limits": "limits.yaml"}
+    for share, good in ((1.0 + 1e-8, peak is not None), (1.0 - 1e-8, False)):
+        most = share * (peak or 99.0)
+        words = f"has_acceleration_limits: true, max_acceleration: {most!r}"
+        made.texts["limits.yaml"] = f"joint_limits:\n  lift: {{{words}}}\n"
+        outcome = made.check(copy.deepcopy(lines))
+        assert outcome.accepted is good
+        assert good or "the limit of its rates" in outcome.reason
+
+
 @pytest.mark.parametrize(("cover", "parts", "most"), [("hull", 9, 1), ("parts", 3, 3)])
 def test_a_mesh_is_covered_by_as_many_hulls_as_are_asked_for(
     cover: str, parts: int, most: int

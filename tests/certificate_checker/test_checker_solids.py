@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.certificate_checker.balls import Rejected
-from vdsm_pin.certificate_checker.solids import Solid, away, boundary
+from vdsm_pin.certificate_checker.solids import Solid, away, boundary, hulls
 
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
 
@@ -84,3 +84,29 @@ def test_a_disc_reaches_by_its_radius_times_the_sine_of_its_axis() -> None:
         sine = np.sqrt(1.0 - (axis @ n) ** 2)
         expected = point @ n - 0.1 - radius * sine
         assert solid.support(n, 0, 1) == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sense", [1, -1])
+def test_hulls_of_open_meshes_share_a_point_where_they_are_near(
+    axis: int, sense: int, share: float
+) -> None:
+    """Three triangles in a row, a thousandth of their size apart, or a little more."""
+    one, size = np.array([[0.0, 0, 0], [1, 0, 1], [0, 1, 1]]), np.sqrt(11.0)
+    step = np.zeros(3)
+    step[axis] = 1.0 + share * size / 1000  # the gaps make it no larger to speak of
+    corners = np.array([one + k * step for k in range(3)])[::sense]
+    groups = [[0], [1], [2]]
+    tips = corners.mean(axis=1)
+    tips = tips if share > 1.0 else np.tile(tips.mean(axis=0), (3, 1))
+    for found, part, tip in zip(
+        hulls("m", corners, groups), corners, tips, strict=True
+    ):
+        np.testing.assert_allclose(found, np.unique([*part, tip], axis=0), atol=1e-12)
+    alone = hulls("m", corners, groups, inside=False)
+    for found, part in zip(alone, corners, strict=True):
+        np.testing.assert_array_equal(found, np.unique(part, axis=0))
+    for wrong in ([[0], [1]], [[0, 1]], [[1], [2]]):
+        with pytest.raises(Rejected, match="pieces of m do not make up the whole"):
+            hulls("m", corners, wrong)

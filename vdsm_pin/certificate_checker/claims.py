@@ -74,7 +74,7 @@ class Clearances:
 
     def _settle(self) -> None:
         """Check the planes that wait."""
-        every = {plane.slice: 0 for planes in self.waiting.values() for plane in planes}
+        every = dict.fromkeys(x.slice for some in self.waiting.values() for x in some)
         slices = Slices(self.tree, [*every])
         for pair, planes in self.waiting.items():
             few = max(1, ROOM // len(pair.body.solid.levers))

@@ -118,7 +118,7 @@ class Drawing:
         """Take in an interval with both rows on the path, or a part of one.
 
         Args:
-            begin: Station where it begins, within the path; [m].
+            begin: Station where it begins if none was taken in just before; [m].
             run: How far it advances, as `step` has it; [m].
             tips: The tip at both ends.
             bend: How far it may lie off the chord in between; [m].

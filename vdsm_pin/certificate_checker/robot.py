@@ -374,7 +374,7 @@ def primitive(name: str, points: Any, cover: Any) -> Solid:
     corners = origin + np.array([*product((0, 1), repeat=len(edges))]) @ edges
     far = float(max(np.abs(x).max() for x in (corners, points))) + radius
     off = np.linalg.norm(origin + shares @ edges - points, axis=1)
-    holds = radius > 0.0 and (off <= radius - 2.0**-46 * far).all()
+    holds = (off <= radius - 2.0**-46 * far).all()
     claim(holds, f"{name}: a corner of its mesh is not proved inside of what holds it")
     return Solid(name, [corners], far, radius)
 

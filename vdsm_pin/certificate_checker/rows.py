@@ -125,13 +125,13 @@ class Rows:
         """Take what the tip does at both rows and in between into the drawing."""
         stations = [arb(float(self.rows.path_m[row])) for row in rows]
         on, same = self.rows.on_path[[*rows]], arb(self.problem.tip_tolerance)
-        for i in np.flatnonzero(on).tolist():
+        # The first row was taken in with the interval before, where there is one.
+        for i in (i for i in range(rows[0] > 0, 2) if on[i]):
             away = norm(tips[-i] - drawing.point(stations[i]))
             claim(away <= same, "the tip is {} mm off the path", MM * away)
-            if i == 1 or rows[0] == 0:  # else it was taken in with the interval before
-                ahead = drawing.visit(stations[i], bool(on[0]), same)
-                forwards = ahead >= -same - SLACK or not self.ordered
-                claim(forwards, "the path is drawn {} mm backwards", -MM * ahead)
+            ahead = drawing.visit(stations[i], bool(on[0]), same)
+            forwards = ahead >= -same - SLACK or not self.ordered
+            claim(forwards, "the path is drawn {} mm backwards", -MM * ahead)
             self._look(drawing, motion, (stations[i], arb(0)), (float(i), float(i)))
         if not on.all():
             drawing.last = None
@@ -143,8 +143,7 @@ class Rows:
         slices = Slices(motion.tree, [(motion, *both) for both in times])
         bends = slices.sweep(0, self.link).at(self.last).bend / (8 * parts**2)
         for k, bend in enumerate(bends.tolist()):
-            start = begin + run * times[k][0]
-            drawing.draw(start, run / parts, tips[k : k + 2], bend)
+            drawing.draw(begin, run / parts, tips[k : k + 2], bend)
 
     def _look(
         self, drawing: Drawing, motion: Interval, way: tuple[Ball, Ball], times: Any
