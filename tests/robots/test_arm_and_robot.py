@@ -28,6 +28,7 @@ from vdsm_pin.report.inputs import file_notes
 from vdsm_pin.report.page_data import report_data
 from vdsm_pin.robots.by_itself import POSES
 from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import Verdict, Verification
 
 ARM = {"link_lengths": [0.3, 0.25], "link_radius": 0.03, "max_link_angle_deg": 80.0,
@@ -111,6 +112,30 @@ def test_closed_form_and_either_judged(seed: int, tmp_path: Path) -> None:
         names = [check.name for check in found.checks]
         assert (f"other: {POSES}" in names) == (name == "arm")
         assert "other: " in report_data(found).text
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_limits_of_a_snake_arm_among_others(share: float, tmp_path: Path) -> None:
+    """As of the arm itself; its angles are largest at waypoints."""
+    arm, ball = both(tmp_path, 0)
+    angles = np.array([[-0.1, 0.6, 0.2, 0.3, -0.4], [0.1, -0.7, 0.1, 0.2, 0.5]])
+    none = np.zeros(2, bool), np.zeros(2)
+    motion = Trajectory.of_joints(angles, *none, times=np.array([0.0, 3.0]))
+    write_trajectory(tmp_path / "arm.csv", motion)
+    limit, problem = share * np.rad2deg(0.7), json.loads(ball.read_text())
+    problem["others"][0]["manipulator"] |= {"max_joint_angle_deg": limit}
+    ball.write_text(json.dumps(problem))
+    cell, itself = read_problem_or_cell(ball), api.read_problem(arm)
+    found = subject_of(cell).judge(api.read_trajectory(tmp_path / "ball.csv", cell))
+    checks = {one.name: one for one in found.checks}
+    box = checks["other: alpha in its box"]
+    assert box.worst == pytest.approx(0.7) and box.limit == np.deg2rad(limit)
+    refuted = share < 1.0
+    assert box.verdict is (Verdict.REFUTED if refuted else Verdict.CERTIFIED)
+    assert not refuted or found.verdict is Verdict.REFUTED
+    for one in check_limits(itself, motion):
+        other = checks[f"other: {one.name}"]
+        assert (other.worst, other.where) == (one.worst, one.where)
 
 
 def test_meshes_of_the_other_robot_and_its_errors(tmp_path: Path) -> None:

@@ -35,8 +35,8 @@ MAX_BYTES: Final = 1 << 30
 """Of a file of another arm or robot."""
 
 HELD: Final = (
-    "{}: is judged by its clearance from this arm alone: its limits, and clearances "
-    "between its own links and from obstacles are not judged"
+    "{}: is judged by its limits and its clearance from what is judged here alone: "
+    "clearances between its own links and from obstacles are not judged"
 )
 
 
@@ -154,7 +154,7 @@ def _bodies(
     """Those of a snake arm whose rail stands at a pose, T_base_other, (4, 4); [m]."""
     joints = list(arm_tree(arm).joints)
     joints[RAIL] = replace(joints[RAIL], placement=pose)
-    itself = ByItself((HELD.format(name),))
+    itself = ByItself((HELD.format(name),), arm=(arm, motion))
     carrier = Carrier(Tree(tuple(joints)), motion.path, name, itself)
     for link, solid in (*arm.rods, *arm.carried):
         named = replace(solid, name=f"{name}: {solid.name}")

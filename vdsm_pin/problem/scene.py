@@ -1,6 +1,6 @@
 """Obstacles, at rest and moving, in the base frame."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
@@ -15,7 +15,9 @@ from vdsm_pin.proof.tree import Kind, Tree
 from vdsm_pin.tolerances import TOLERANCES
 
 if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
+    from vdsm_pin.arm.manipulator import Manipulator
     from vdsm_pin.geometry.pieces import PackedPieces
+    from vdsm_pin.problem.trajectory import Trajectory
     from vdsm_pin.proof.paths import Path
 
 
@@ -27,11 +29,13 @@ class ByItself:
         notes: What a reader should know, a sentence each.
         covers: By link, of each of its meshes the triangles under each hull, or the
             primitive around it, where that is not one hull each.
-        checks: Rows of evidence about it alone, such as its limits.
+        arm: It, where it is a snake arm, and its motion.
+        checks: Rows of evidence about it alone where it is none, such as its limits.
     """
 
     notes: tuple[str, ...] = ()
     covers: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    arm: "tuple[Manipulator, Trajectory] | None" = None
     checks: Callable[[], Sequence[Any]] = tuple
 
 
@@ -189,11 +193,6 @@ class Scene:
     def carriers(self) -> tuple[Carrier, ...]:
         """The carriers of the obstacles that move, each once."""
         return tuple(dict.fromkeys(one.carrier for one in self.moving))
-
-    def checks_of_carriers(self) -> Iterator[Any]:
-        """Rows of evidence about other arms and robots by themselves."""
-        for one in self.carriers:
-            yield from one.itself.checks()
 
 
 def with_hulls(scene: Scene, names: Collection[str]) -> Scene:

@@ -40,9 +40,12 @@ def pose_check(robot: Robot, path: Path) -> Check:
     return Check(POSES, verdict, count, float(off[k]), *told, float(rows[k]))
 
 
-def limit_checks(robot: Robot, path: Path) -> list[Check]:
-    """A row for each stated limit, of rates too; slack for the readers' arithmetic."""
-    rows = []
+def checks_by_itself(robot: Robot, path: Path) -> list[Check]:
+    """Its poses, and a row for each stated limit, of rates too.
+
+    Limits have slack for the arithmetic of readers.
+    """
+    rows = [pose_check(robot, path)]
     for k, joint in enumerate(robot.joints):
         ends = joint.lower, joint.upper
         if np.isfinite(ends).all():

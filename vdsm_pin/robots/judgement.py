@@ -13,7 +13,7 @@ from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, answer, prove
 from vdsm_pin.proof.terms import REFUTED
-from vdsm_pin.robots.by_itself import limit_checks, pose_check
+from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.clearances import (
     least_clearances,
@@ -40,6 +40,7 @@ from vdsm_pin.verification.contacts import MEETING
 from vdsm_pin.verification.enclosed import enclosed_least
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS_OUTSIDE, check_inside
+from vdsm_pin.verification.limits import checks_of_others
 from vdsm_pin.verification.moving import Knots, in_short_parts, joined_path
 from vdsm_pin.verification.records import Check, Verdict, Verification
 
@@ -106,9 +107,8 @@ def verify_robot(
         ),
     )
     checks = [
-        pose_check(robot, path),
-        *limit_checks(robot, path),
-        *cell.scene.checks_of_carriers(),
+        *checks_by_itself(robot, path),
+        *checks_of_others(cell.scene),
         *check_inside(by_mesh(cell, located), LINKS_OUTSIDE),
         *clearance_checks(cell, evidence, None if proof.in_time else deadline),
         *([coal] if cell.pairs else [_no_pair(cell)]),

@@ -3,27 +3,19 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from math import nan
-from typing import Final, cast
+from typing import cast
 
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.solids import ConvexCover
-from vdsm_pin.io.others import OtherFile, Others
+from vdsm_pin.io.others import HELD, OtherFile, Others
 from vdsm_pin.io.source import files_in
 from vdsm_pin.problem.scene import ByItself, Carrier, Moving
-from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.by_itself import limit_checks, pose_check
+from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.files import HULLS, files_of_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.trajectory_files import path_of, read_motion
 from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.verification.records import Check
-
-HELD: Final = (
-    "is judged by its limits and its clearance from this robot alone: clearances "
-    "between its own links and from obstacles are not judged"
-)
 
 
 def read_other(one: OtherFile) -> Others:
@@ -38,11 +30,12 @@ def read_other(one: OtherFile) -> Others:
     path = path_of(one.trajectory, motion)
     base, *joints = robot.tree.joints
     tree = Tree((replace(base, placement=one.pose), *joints))
-    said = (HELD, *robot.notes, *(f"trajectory: {note}" for note in motion.notes))
+    said = (*robot.notes, *(f"trajectory: {note}" for note in motion.notes))
+    notes = (HELD.format(one.name), *(f"{one.name}: {note}" for note in said))
     itself = ByItself(
-        notes=tuple(f"{one.name}: {note}" for note in said),
+        notes=notes,
         covers={} if robot.solids == HULLS else robot.covers,
-        checks=partial(_checks, one.name, robot, path),
+        checks=partial(checks_by_itself, robot, path),
     )
     links = tuple(_links(robot, Carrier(tree, path, one.name, itself)))
     named = (*files.files, *robot.more_files, *files_in(one.trajectory))
@@ -54,9 +47,3 @@ def _links(robot: Robot, carrier: Carrier) -> Iterator[Moving]:
         pieces = cast("tuple[Hull | FlatCylinder, ...]", tuple(body.pieces))
         cover = ConvexCover(f"{carrier.robot}: {body.name}", pieces)
         yield Moving(cover, carrier, body.frame)
-
-
-def _checks(name: str, robot: Robot, path: Path) -> list[Check]:
-    """Its poses and limits; their moments are not those of the motion judged."""
-    checks = (pose_check(robot, path), *limit_checks(robot, path))
-    return [replace(one, name=f"{name}: {one.name}", moment=nan) for one in checks]

@@ -4,15 +4,19 @@ The angles and x0 are linear over an interval, and psi = arccos(cos theta cos al
 quasi-convex below 90 deg, so that each is largest at an end (docs/certificate.md).
 """
 
+from collections.abc import Iterator
+from dataclasses import replace
 from math import nan
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm.kinematics import link_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bernstein import part
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.tolerances import TOLERANCES
@@ -78,7 +82,7 @@ def _angle_check(
 
 
 def check_limits(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check, ...]:
-    """Box of theta and alpha, cone of psi, rail, and the change if it is limited.
+    """The limits of the arm, and of the change between rows if that is limited.
 
     Args:
         problem: Names the arm and its limits.
@@ -87,9 +91,18 @@ def check_limits(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Chec
     Returns:
         One row each. The limits hold at every instant between the rows as well.
     """
-    arm, path, count = problem.manipulator, trajectory.path, trajectory.alpha.size
-    box, cone, step = arm.max_joint_angle, arm.max_link_angle, problem.max_row_change
-    checks = []
+    checks, step = arm_limits(problem.manipulator, trajectory), problem.max_row_change
+    if step is not None and trajectory.n_samples > 1:
+        change = _largest_change(trajectory.path)
+        name, where = CHANGE, f"joint {change.column // 2 + 1}"
+        checks.append(_angle_check(name, where, step, trajectory.alpha.size, change))
+    return tuple(checks)
+
+
+def arm_limits(arm: Manipulator, trajectory: Trajectory) -> list[Check]:
+    """A row each of the box of theta and alpha, of the cone of psi and of the rail."""
+    path, count = trajectory.path, trajectory.alpha.size
+    box, cone, checks = arm.max_joint_angle, arm.max_link_angle, []
     for name, symbol, limit, measure in (
         ("alpha in its box", "alpha", box, _alpha),
         ("theta in its box", "theta", box, _theta),
@@ -100,9 +113,15 @@ def check_limits(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Chec
         checks.append(_angle_check(name, where, limit, count, found))
     row = Check(RAIL, Verdict.UNDECIDED, trajectory.n_samples, nan, nan, "m")
     slack = TOLERANCES.base_limit
-    checks.append(range_check(path, 0, arm.base_range, slack, row))
-    if step is not None and trajectory.n_samples > 1:
-        change = _largest_change(path)
-        name, where = CHANGE, f"joint {change.column // 2 + 1}"
-        checks.append(_angle_check(name, where, step, count, change))
-    return tuple(checks)
+    return [*checks, range_check(path, 0, arm.base_range, slack, row)]
+
+
+def checks_of_others(scene: Scene) -> Iterator[Check]:
+    """Rows of other arms and robots by themselves, over all of their own motions.
+
+    Their moments are not those of the motion judged.
+    """
+    for one in scene.carriers:
+        own = arm_limits(*one.itself.arm) if one.itself.arm else one.itself.checks()
+        for row in own:
+            yield replace(row, name=f"{one.robot}: {row.name}", moment=nan)

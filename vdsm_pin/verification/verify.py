@@ -53,7 +53,7 @@ from vdsm_pin.verification.inside import (
     locate_start,
     unlocated,
 )
-from vdsm_pin.verification.limits import check_limits
+from vdsm_pin.verification.limits import check_limits, checks_of_others
 from vdsm_pin.verification.moving import check_timed
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.records import ArmVerification, Check, Counterexample
@@ -124,7 +124,7 @@ def verify(
             lambda: fk.check_fk(robot, problem, trajectory, centres, deadline),
         ),
         *check_limits(problem, trajectory),
-        *problem.scene.checks_of_carriers(),
+        *checks_of_others(problem.scene),
         *tip.checks,
         *guarded(
             pointing.NAME,
