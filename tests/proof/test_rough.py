@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from oracles.tree_queries import make_query
 
+from vdsm_pin.arm.bodies import hull_distances
+from vdsm_pin.geometry.arrays import FloatArray, distinct_rows
 from vdsm_pin.geometry.convex import FewCorners, Hull
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.error_box import ErrorBox
@@ -14,8 +16,10 @@ from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.rough import with_rough
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.proof.tree import Kind
+from vdsm_pin.robots import hulls
 from vdsm_pin.robots.hulls import FEW_CORNERS, few_corners
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.coal_hulls import hull_planes
 
 
 def shrunk(body: Body, shares: Sequence[float], told: float = 1.0) -> Body:
@@ -106,6 +110,31 @@ def test_few_corners_miss_no_more_than_they_tell(n: int) -> None:
         for few in found:
             more = (points @ ways.T).max(axis=0) - (few.points @ ways.T).max(axis=0)
             assert 0.8 * few.missed - 1e-6 <= more.max() <= few.missed
+
+
+def test_what_is_inside_few_corners_is_not_asked_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A hull of many corners holds all points, by the planes of its faces."""
+    rng = np.random.default_rng(3)
+    ways = rng.normal(size=(3000, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    inner = 0.8 * rng.uniform(0.0, 1.0, (2400, 1)) * ways[:2400]
+    on_skin, asked = 1.0 - 1e-12 * rng.uniform(size=(600, 1)), list[int]()
+
+    def counted(points: FloatArray, corners: FloatArray) -> FloatArray:
+        asked.append(len(points))
+        return hull_distances(points, corners)
+
+    monkeypatch.setattr(hulls, "hull_distances", counted)
+    points = 0.1 * np.concatenate([inner, ways[2400:] * on_skin, ways[2400:]])
+    hull = hulls.covering_hull(distinct_rows(points))
+    planes = hull_planes(hull.points)
+    assert planes is not None and 600 <= len(hull.points) <= 1200
+    normals, offsets = planes
+    assert (normals @ points.T - offsets[:, None]).max() <= hull.radius + 1e-15
+    assert hull.radius <= 1e-9
+    assert asked[0] <= 1200  # all that are not inner
 
 
 def test_few_corners_of_few_are_none() -> None:

@@ -16,6 +16,7 @@ from vdsm_pin.geometry.arrays import (
     BoolArray,
     FloatArray,
     IntArray,
+    distinct,
     distinct_rows,
 )
 from vdsm_pin.geometry.closed_meshes import closed_parts
@@ -193,7 +194,9 @@ def grouped(corners: FloatArray, parts: int) -> tuple[IntArray, ...]:
     A closed surface has groups of its own where there are enough for all.
     """
     parts = min(parts, len(corners))
-    part = closed_parts(corners) if parts > 1 else None
+    if parts == 1:
+        return (np.arange(len(corners)),)
+    part = closed_parts(corners)
     sizes = np.bincount(np.zeros(len(corners), int) if part is None else part)
     if part is None or len(sizes) > parts:
         part, sizes = np.zeros(len(corners), int), np.array([len(corners)])
@@ -211,17 +214,39 @@ def grouped(corners: FloatArray, parts: int) -> tuple[IntArray, ...]:
 def outer_points(points: FloatArray) -> FloatArray:
     """Some of the points, with the same hull; those surely inside are left out."""
     points = distinct_rows(points)
+    return np.asarray(points[missed_by_few(points) > 0.0])
+
+
+def missed_by_few(points: FloatArray) -> FloatArray:
+    """How far points are at most from a hull of few of them; inf for these few.
+
+    Args:
+        points: Shape (n, 3); [m].
+
+    Returns:
+        Shape (n,); [m].
+    """
+    missed = np.full(len(points), np.inf)
     if len(points) <= DIRECTIONS // 4:
-        return points
+        return missed
     directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))
-    few = np.unique(np.argmax(points @ directions.T, axis=0))
-    pieces = pack_pieces([[Hull(points[few])]])
+    few = distinct(np.argmax(directions @ points.T, axis=1))
+    missed = hull_distances(points, points[few])
+    missed[few] = np.inf
+    return missed
+
+
+def hull_distances(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Bounds from above of how far points are from a hull, shape (n,); [m].
+
+    Args:
+        points: Shape (n, 3); [m].
+        corners: Of the hull, shape (m, 3); [m].
+    """
+    pieces = pack_pieces([[Hull(corners)]])
     ends = np.ascontiguousarray(np.repeat(points[:, None], 2, axis=1))
     none = np.zeros(len(points), np.int64)
-    bounds = row_brackets(pieces, ends, none, TOLERANCES.bracket_gap)
-    keep = bounds[:, 1] > 0.0
-    keep[few] = True
-    return np.asarray(points[keep])
+    return row_brackets(pieces, ends, none, TOLERANCES.bracket_gap)[:, 1]
 
 
 def self_pairs(arm: Manipulator, bodies: tuple[ArmBody, ...]) -> SelfPairs:

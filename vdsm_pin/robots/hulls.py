@@ -4,11 +4,9 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.bodies import outer_points
+from vdsm_pin.arm.bodies import hull_distances, missed_by_few
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.convex import FewCorners, Hull
-from vdsm_pin.geometry.pieces import pack_pieces
-from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.coal_hulls import coal_hull
@@ -32,17 +30,20 @@ def covering_hull(points: FloatArray) -> Hull:
     """A hull of few of the points, grown until it is proved to hold all of them.
 
     Args:
-        points: Shape (n, 3); [m].
+        points: All of them differ, shape (n, 3); [m].
     """
+    missed = missed_by_few(points)
+    inner = missed <= TOLERANCES.arithmetic
     if (hull := coal_hull(points)) is not None:
         corners = np.array(hull.points())
-        # A distance from a hull is convex: no point inside of others is farther off.
-        known, outer = set(map(tuple, corners.tolist())), outer_points(points)
-        other = [tuple(point) not in known for point in outer.tolist()]
-        grown = float(_distances(outer[other], corners).max(initial=0.0))
+        # A distance from a hull is convex: what is inner adds no more than it misses.
+        known, rest = set(map(tuple, corners.tolist())), points[~inner]
+        other = [tuple(point) not in known for point in rest.tolist()]
+        grown = missed[inner].max(initial=0.0)
+        grown += hull_distances(rest[other], corners).max(initial=0.0)
         if grown <= MOST_GROWN:
-            return Hull(corners, grown, few_corners(corners))
-    corners = outer_points(points)
+            return Hull(corners, float(grown), few_corners(corners))
+    corners = points[missed > 0.0]
     return Hull(corners, few=few_corners(corners))
 
 
@@ -81,16 +82,8 @@ def _most_missed(points: FloatArray, chosen: list[int], missed: FloatArray) -> i
     fresh = np.zeros(len(points), bool)
     while not fresh[worst := int(np.argmax(missed))]:
         some = np.argsort(missed)[-SOME:]
-        missed[some], fresh[some] = _distances(points[some], points[chosen]), True
+        missed[some], fresh[some] = hull_distances(points[some], points[chosen]), True
     return worst
-
-
-def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Bounds from above of how far points are from a hull, shape (n,); [m]."""
-    pieces = pack_pieces([[Hull(corners)]])
-    ends = np.ascontiguousarray(np.repeat(points[:, None], 2, axis=1))
-    none = np.zeros(len(points), np.int64)
-    return row_brackets(pieces, ends, none, TOLERANCES.bracket_gap)[:, 1]
 
 
 def covering_primitive(points: FloatArray) -> Hull:

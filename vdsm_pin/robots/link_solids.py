@@ -107,6 +107,7 @@ class LinkReader:
         groups = grouped(corners, count)
         covers.append(groups)
         for points in covering_points(corners, groups):
+            points = distinct_rows(points)  # noqa: PLW2901
             yield covering_hull(distinct_rows(shift + points @ turn.T))
 
     def _triangles(self, link: str, shape: ET.Element) -> FloatArray:

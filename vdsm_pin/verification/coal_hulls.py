@@ -84,7 +84,7 @@ def coal_hull(points: FloatArray) -> Any | None:
     if not is_solid(points):
         return None
     vertices = coal.StdVec_Vec3s()
-    vertices.extend([np.array(point) for point in points])
+    vertices.extend(list(points))
     # A face of hundreds of corners, cut into a fan, has more neighbours at its tip than
     # Coal can count; of joggled points it is cut otherwise.
     for how in ("Qt", "QJ"):
