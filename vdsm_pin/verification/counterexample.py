@@ -18,7 +18,8 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.bodies import Pair as ProofPair
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import prove, start_proof
+from vdsm_pin.proof.prover import answer
+from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.time_limit import Deadline
@@ -112,9 +113,9 @@ class Search:
 
     def __init__(self, asked: ErringPair) -> None:
         self.asked, self.limit = asked, asked.required + asked.grown
-        path = Path(asked.rows(np.zeros(1)))
         table = PairTable.of([ProofPair(0, 1, self.limit)])
-        self.task = start_proof(asked.tree, asked.bodies, path, table)[0].task
+        self.question = Question.of(asked.tree, asked.bodies, table)
+        self.task = self.question.about(Path(asked.rows(np.zeros(1)))).task
 
     def find(self, moments: tuple[Moment, ...]) -> Counterexample | None:
         """A configuration within the box that misses the required clearance.
@@ -202,8 +203,7 @@ class Search:
     def _judged(self, moment: Moment, offset: FloatArray) -> Counterexample | None:
         """What the clearance proof says of one configuration."""
         asked, q = self.asked, self._joints(moment) + offset
-        pair = ProofPair(0, 1, self.limit)
-        proof = prove(asked.tree, asked.bodies, Path(q[None]), [pair])
+        proof = answer(self.question, Path(q[None]))
         upper, points = float(proof.upper[0]), proof.points[0]
         refuted = proof.verdict[0] == REFUTED
         if not refuted and upper <= self.limit:
