@@ -37,7 +37,7 @@ extensions = [
     "sphinx_copybutton",
     "command_pages",
 ]
-myst_enable_extensions = ["deflist", "colon_fence"]
+myst_enable_extensions = ["deflist", "colon_fence", "html_image"]
 myst_heading_anchors = 4
 napoleon_custom_sections = [("Attributes", "params_style")]
 autodoc_typehints = "signature"

@@ -32,7 +32,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdsm_pin.text import printable
-from vdsm_pin.units import MM_PER_M, in_mm
+from vdsm_pin.units import MM_PER_M, clearance_words, in_mm
 
 
 class VdsmError(Exception):
@@ -235,7 +235,7 @@ class StartBlocked(Infeasible):
         message = (
             f"at its start {called or f'link {link}'} of the "
             f"{'' if bent else 'straight '}arm has "
-            f"{in_mm(clearance)}{' or deeper' if deeper else ''} to obstacle "
+            f"{clearance_words(clearance, deeper)} to obstacle "
             f"{obstacle!r}, required are {in_mm(required)}"
         )
         if not bent:

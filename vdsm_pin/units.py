@@ -16,4 +16,9 @@ MM_PER_M: Final = 1e3
 
 def in_mm(length: float) -> str:
     """A length as people read it, in messages and notes; [m] to mm."""
-    return f"{length * MM_PER_M:.3f} mm" if isfinite(length) else "-"
+    return f"{length * MM_PER_M:.3f} mm".replace("-", "−") if isfinite(length) else "-"
+
+
+def clearance_words(clearance: float, deeper: bool = False) -> str:
+    """A clearance as messages state it, of a depth perhaps that it is more; [m]."""
+    return f"a clearance of {in_mm(clearance)}{' or deeper' if deeper else ''}"

@@ -130,16 +130,19 @@ def test_a_feed_that_is_too_near_at_the_start_is_named(name: str) -> None:
     caught = refusal(task, name)
     assert (caught.link, caught.obstacle) == (0, "ball")
     assert caught.clearance == pytest.approx(0.0045, abs=1e-8)
-    assert "at its start the feed of the straight arm has 4.500 mm to" in str(caught)
+    assert (
+        "at its start the feed of the straight arm has a clearance of 4.500 mm to"
+        in str(caught)
+    )
     ignoring = replace(arm, ignore_pairs=(("ball", "feed"),))
     check_start(replace(task, manipulator=ignoring), link_clearance(task))
     check_start(replace(task, required_clearance=0.004), link_clearance(task))
 
 
 def test_a_start_whose_axis_meets_an_obstacle_is_that_deep_or_deeper() -> None:
-    assert "-1.000 mm to" in str(refusal(starting(-0.001), "fewest"))
+    assert "has a clearance of −1.000 mm to" in str(refusal(starting(-0.001), "fewest"))
     told = str(refusal(starting(-0.1), "fewest"))
-    assert f"{-1e3 * ARM.link_radius:.3f} mm or deeper to" in told
+    assert f"has a clearance of −{1e3 * ARM.link_radius:.3f} mm or deeper to" in told
 
 
 def test_a_narrow_place_is_as_wide_as_it_is_however_thick_the_links() -> None:

@@ -111,6 +111,7 @@ def test_everything_a_reader_needs_is_there(tmp_path: Path) -> None:
 def test_missing_evidence_is_shown_as_missing(tmp_path: Path) -> None:
     text = report(tmp_path, made_up.verification(scene=Scene(), joint_error=math.nan))
     assert 'class="value missing">not available' in text
+    assert 'class="value">not sought' in text
     assert "there is no obstacle" in text
 
 

@@ -20,6 +20,7 @@ from vdsm_pin.simulation.folder import (
     simulate_to_folder,
 )
 from vdsm_pin.simulation.settings import Controller, Kick, Sensors, Settings, Speed
+from vdsm_pin.simulation.terminal import show_simulation
 from vdsm_pin.simulation.time_law import row_times
 
 pytest.importorskip("mujoco")
@@ -149,7 +150,9 @@ def test_what_is_proved_covers_the_errors_that_the_problem_states() -> None:
     assert stated.verdict != "certified"
 
 
-def test_a_folder_holds_what_the_verifier_takes(tmp_path: Path) -> None:
+def test_a_folder_holds_what_the_verifier_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     problem = read_problem("paper/obs3")
     file = tmp_path / "t.csv"
     vp.write_trajectory(file, bending(10, angle=0.02))
@@ -167,3 +170,6 @@ def test_a_folder_holds_what_the_verifier_takes(tmp_path: Path) -> None:
     record = (tmp_path / "out" / "simulation.csv").read_text().splitlines()
     assert len(record[0].split(",")) == 1 + 17 + 17 + 24
     assert len(record) == executed.n_samples + 1
+    less = told.executed.model_copy(update={"min_clearance_m": 0.0101369})
+    show_simulation(told.model_copy(update={"executed": less}), tmp_path)
+    assert "10.136 mm" in capsys.readouterr().out  # what is proved is rounded down

@@ -67,6 +67,9 @@ def test_a_thinned_run_keeps_its_extremes_and_the_times_of_its_stiffness() -> No
 
 def test_every_assumption_stands_on_the_page() -> None:
     names = [name for name, _, _ in assumptions(Settings())]
+    assert ("kicks", "0") in [
+        (name, value) for name, value, _ in assumptions(Settings())
+    ]
     assert len(names) == len(set(names))
     for part, fields in Settings().model_dump().items():
         keys = [f"{part}.{key}" for key in fields] if isinstance(fields, dict) else []

@@ -232,7 +232,7 @@ def repair(
         order = VerifyOrder(asked, trajectory, out, context.obj, options=options)
         found = repair_to_folder(order, tuple(pin or ()))
     new, most = int((found.given < 0).sum()), found.moved.max()
-    changed = f"{new} of them new; moved by {most:.6f} rad (m) at most"
+    changed = f"{new} of them new; moved by {most:.6f} rad or m at most"
     how = changed if new or most else "none of them moved: it was clear as given"
     answer.tell(
         f"certified with {len(found.moved)} waypoints, {how}; wrote {out}",

@@ -14,7 +14,7 @@ from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import in_mm
+from vdsm_pin.units import clearance_words
 
 TIP_ONLY: Final = slice(-1, None)
 """The axis at whose end the tip is."""
@@ -126,7 +126,7 @@ class Culprit:
     @property
     def words(self) -> str:
         """The clearance as people read it."""
-        return in_mm(self.clearance) + (" or deeper" if self.deeper else "")
+        return clearance_words(self.clearance, self.deeper)
 
 
 def culprit(problem: PlanningProblem, centres: FloatArray) -> Culprit:

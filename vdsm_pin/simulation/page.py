@@ -151,7 +151,7 @@ def assumptions(settings: Settings) -> tuple[tuple[str, str, str], ...]:
     for name, field in type(settings).model_fields.items():
         part = getattr(settings, name)
         if not isinstance(part, FileModel):
-            rows.append((name, str(part), field.description or ""))
+            rows.append((name, str(part or 0), field.description or ""))
             continue
         rows += [
             (f"{name}.{key}", str(getattr(part, key)), inner.description or "")

@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from vdsm_pin.report.terminal import show_facts
-from vdsm_pin.report.words import measured, outcome, percent
+from vdsm_pin.report.words import at_least, measured, outcome, percent
 from vdsm_pin.simulation.folder import SimulationFile
 from vdsm_pin.text import printable
 
@@ -16,8 +16,8 @@ def show_simulation(file: SimulationFile, folder: Path) -> None:
     typer.echo(f"{known.mark} {known.word}  {printable(file.problem)}, executed motion")
     show_facts(
         ("duration", f"{file.duration_s:.1f} s"),
-        ("clearance planned", measured(file.planned.min_clearance_m, "m")),
-        ("clearance executed", measured(file.executed.min_clearance_m, "m")),
+        ("clearance planned", at_least(file.planned.min_clearance_m)),
+        ("clearance executed", at_least(file.executed.min_clearance_m)),
         ("largest joint error", measured(file.largest_error_rad, "rad")),
         ("largest base error", measured(file.largest_base_error_m, "m")),
         ("within 0.3°", percent(file.within_band_share)),

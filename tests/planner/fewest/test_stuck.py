@@ -12,7 +12,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
-from vdsm_pin.planner.fewest.explain import refuse
+from vdsm_pin.planner.fewest.explain import minimal, refuse
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import Effort, Insert
 from vdsm_pin.planner.fewest.narrow_passage import narrowest_passage
@@ -77,7 +77,7 @@ def test_the_passage_the_stop_and_the_advice_are_named() -> None:
     assert "the arm came 500.000 mm of 1400.000 mm along it" in words
     # The tip is 80 mm from the wall's face, and 80 mm aside.
     room = np.hypot(0.08, 0.08) - task.manipulator.most_radius
-    assert f"where link 8 has {room * 1e3:.3f} mm to 'wall" in words
+    assert f"where link 8 has a clearance of {room * 1e3:.3f} mm to 'wall" in words
     assert "wider opening" not in words
 
 
@@ -135,11 +135,13 @@ def test_what_keeps_an_arm_from_following_its_tip_is_named() -> None:
     )
     assert "max_link_angle_deg" in told.advice
     told = following(replace(task, manipulator=replace(arm, base_range=(-5, -2.5))), x)
-    assert "its base at x0 = -2496.000 mm, and the rail is" in told.words
+    assert "its base at x0 = −2496.000 mm, and the rail is" in told.words
     assert "with the tip at (630.0, 0.0, 0.0) mm" in told.words
     assert "rail" in told.advice
     told = following(task, x + np.clip(x[:, :1] - 0.3, 0.0, 0.05) * [0.0, 1.0, 0.0])
-    assert re.search(r"leave link 8 \S+ mm to 'wall1' with the tip", told.words)
+    assert re.search(
+        r"leave link 8 a clearance of \S+ mm to 'wall1' with the tip", told.words
+    )
     told = following(task, np.vstack([x, x[-1] + [0.0, 4.0, 0.0]]))
     assert (
         "not reach back to its rail with the tip at (1400.0, 4000.0, 0.0)" in told.words
@@ -190,3 +192,9 @@ def test_what_the_rail_keeps_from_the_path_is_proved() -> None:
     arm = replace(task.manipulator, base_range=(-5.0, 1.39 - 3.126))
     with pytest.raises(OutOfReach, match=r"the base at the end of its rail"):
         plan_fewest(replace(task, manipulator=arm), link_clearance(task), 0.0)
+
+
+def test_a_number_of_angles_that_is_nowhere_proved_minimal_is_not_told() -> None:
+    changed = np.array([2, 3, 1])
+    assert minimal(changed, np.array([1, 1, 0])) == []
+    assert "minimal at 1 of 3 waypoints" in minimal(changed, np.array([1, 3, 0]))[0]

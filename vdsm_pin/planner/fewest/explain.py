@@ -13,7 +13,7 @@ from vdsm_pin.errors import (
     PathBlocked,
     Reached,
 )
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.explore import Outcome
 from vdsm_pin.planner.fewest.motion import Corners, standing
@@ -257,12 +257,7 @@ def notes_of(
             f"{changed[worst]} link angles and {least[worst]} were proved necessary"
         )
         raise RuntimeError(message)
-    notes.append(
-        "the number of changed link angles is proved minimal at "
-        f"{int((changed == least).sum())} of {len(changed)} waypoints on the path: "
-        f"fewer, counting up to {np.rad2deg(TOLERANCES.changed_angle):.2g} deg as "
-        "unchanged, would break a limit or the clearance there"
-    )
+    notes += minimal(changed, least)
     connections = _connections(on_path)
     if len(connections) > 1:
         often = "once" if len(connections) == 2 else f"{len(connections) - 1} times"
@@ -275,6 +270,19 @@ def notes_of(
             f"retreat of {in_mm(retreat)}: no change of sides was found within it"
         )
     return tuple(notes)
+
+
+def minimal(changed: IntArray, least: IntArray) -> list[str]:
+    """At how many waypoints as few link angles change as must; nothing if nowhere."""
+    proved = int((changed == least).sum())
+    if not proved:
+        return []
+    return [
+        f"the number of changed link angles is proved minimal at {proved} of "
+        f"{len(changed)} waypoints on the path: fewer, counting up to "
+        f"{np.rad2deg(TOLERANCES.changed_angle):.2g} deg as unchanged, would break a "
+        "limit or the clearance there"
+    ]
 
 
 def _connections(on_path: BoolArray) -> list[tuple[int, int]]:
