@@ -199,7 +199,7 @@ def test_an_infeasible_problem_leaves_a_page_that_says_why(
     report = (out / "report.html").read_text(encoding="utf-8")
     assert "planned by paper" in report
     assert 'class="banner verdict certified"' in report
-    assert "not sought for this motion" in report
+    assert "vdsm verify looks for it" in report
 
 
 def test_a_plan_that_draws_less_than_required_is_written_and_called_incomplete(

@@ -240,6 +240,7 @@ def test_the_read_out_says_what_is_proved_at_the_slider(report: Watched) -> None
     [
         (-200.0, -150.0, "link 1 meets ball"),
         (0.0, 0.0, "link 1 meets ball"),
+        (-45.0, 1e-8, "link 1 meets ball"),
         (-200.0, 1.0, "link 1 may meet ball"),
         (7.0, 8.0, "link 1 from ball: at least 7.000 mm"),
     ],

@@ -104,7 +104,7 @@ def route_step(moment: Moment) -> Part:
         )
     words = [
         f"The path is joined {SCHEMES[problem.path.approach]} "
-        f"({problem.path.approach.value}).",
+        f"(approach: {problem.path.approach.value}).",
         f"At waypoint {moment.row} of {len(tips.points)} the tip {state}.",
     ]
     side = int(route.side[moment.row])
@@ -278,7 +278,7 @@ def angles_step(moment: Moment) -> Part:
         (
             "In the frame of the link before, a link points along (cos α cos θ, "
             "sin α cos θ, −sin θ); θ and α follow from the joint centres, ψ and γ from "
-            f"them. ψ may be {limit:.1f}°.",
+            f"them. ψ may be {limit:.1f}° at most.",
             f"{3 * arm.n_links} cables: those of link j run through the joints 1 to j.",
         ),
         (

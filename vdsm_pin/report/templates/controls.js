@@ -75,9 +75,9 @@ class Clearances {
     const short = !(link.value >= this.required);
     if (!Number.isFinite(link.value)) return { text: "clearance not known here", short };
     const known = Math.abs(obstacle.value - link.value) < 1e-3;
-    if (link.value < 0 || link.upper <= 0) {
-      const meets = link.upper <= 0 ? "meets" : "may meet";
-      return { text: `${link.name} ${meets} ${known ? obstacle.name : "an obstacle"}`, short };
+    const meets = link.upper < 2e-6;  // [mm]: where the proof finds contact, and no depth
+    if (link.value < 0 || meets) {
+      return { text: `${link.name} ${meets ? "meets" : "may meet"} ${known ? obstacle.name : "an obstacle"}`, short };
     }
     const from = known ? ` from ${obstacle.name}` : "";
     return { text: `${link.name}${from}: at least ${lengthText(link.value / 1000, true)}`, short };
