@@ -147,9 +147,13 @@ def test_slider_plot_and_play_move_one_moment(report: Watched) -> None:
     assert clicked == pytest.approx(inner, abs=1.0)
     assert float(page.locator("[data-slider]").input_value()) == pytest.approx(clicked)
     assert not np.array_equal(before, pixels(page)), "the arm did not move"
+    page.locator("[data-speed]").select_option(
+        "0.1"
+    )  # it shall not end before it stops
     page.locator("[data-play]").click()
-    page.wait_for_function(f"vdsm.motion.time > {clicked + 1}")
+    page.wait_for_function(f"vdsm.motion.time > {clicked + 0.1}")
     page.locator("[data-play]").click()
+    page.locator("[data-speed]").select_option("1")
     stopped = time_of(report)
     page.wait_for_timeout(100)
     assert time_of(report) == stopped
