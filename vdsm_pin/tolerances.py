@@ -41,11 +41,15 @@ class Tolerances:
     The steps converge quadratically: the error after a step of 1e-7 is about 1e-14.
     """
 
-    joint_limit: float = _held(1e-9, "rad")
-    """Excess over theta/alpha/psi that counts as rounding of a CSV; [rad]."""
+    joint_limit: float = _held(0.999e-9, "rad")
+    """Excess over theta/alpha/psi that counts as rounding of a CSV; [rad].
 
-    base_limit: float = _held(1e-9, "m")
-    """Excess over the x0 range that counts as rounding of a CSV; [m]."""
+    The checker, which computes in balls, allows 1e-9: it accepts what rounding here
+    leaves within this.
+    """
+
+    base_limit: float = _held(0.999e-9, "m")
+    """Excess over the x0 range that counts as rounding of a CSV, as above; [m]."""
 
     changed_angle: float = _held(8.726646259971648e-4, "rad")
     """A link angle above this counts as changed: 0.05 deg; [rad]."""

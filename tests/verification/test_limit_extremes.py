@@ -1,12 +1,16 @@
 """Limits over random motions; oracle: thousands of moments of each."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb
 
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -146,3 +150,35 @@ def assert_judged_rail(row: Check, x0: np.ndarray, exact: bool) -> None:
     if exact or abs(below - above) > 0.01:
         at, limit = (x0.min(), -RAIL) if below > above else (x0.max(), RAIL)
         assert (row.worst, row.limit) == (pytest.approx(at, abs=2e-3), limit)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_checker_accepts_what_is_certified_on_a_limit(seed: int) -> None:
+    """Joints within a few units in the last place of the most that is allowed."""
+    rng, slack = np.random.default_rng(seed), TOLERANCES.joint_limit
+    joints = np.zeros((2, 1 + 2 * ARM.n_links))
+    joint, sign = 2 * int(rng.integers(ARM.n_links)), float(rng.choice([-1.0, 1.0]))
+    yaw = float(rng.uniform(0.25, BOX))
+    pitch = np.arccos(np.cos(CONE + slack) / np.cos(yaw))
+    cases = [
+        (1 + joint, sign * (BOX + slack), 0.0),
+        (1 + joint, yaw, sign * pitch),
+        (0, sign * (RAIL + TOLERANCES.base_limit), 0.0),
+        (1 + joint, sign * yaw, sign * (yaw - STEP - slack)),
+    ]
+    for k, (column, most, other) in enumerate(cases):
+        rows = joints.copy()
+        value = most + int(rng.integers(-3, 4)) * np.spacing(most)
+        if k == 3:
+            rows[0, column], rows[1, column] = value, other
+        elif k == 1:
+            rows[:, column : column + 2] = value, other
+        else:
+            rows[:, column] = value
+        motion = Trajectory.of_joints(rows)
+        found = [row.verdict for row in check_limits(PROBLEM, motion)]
+        if all(verdict is Verdict.CERTIFIED for verdict in found):
+            columns = [[arb(float(q)) for q in column] for column in rows.T]
+            interval: Any = SimpleNamespace(controls=columns, degree=1)
+            asked: Any = SimpleNamespace(problem=PROBLEM, lengths=[1.0])
+            Rows(asked, motion)._limits(interval)
