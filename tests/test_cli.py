@@ -579,12 +579,17 @@ def test_a_closed_pipe_is_no_verdict(words: list[str], planned: Path) -> None:
 
 @pytest.mark.parametrize(
     ("closed", "more", "status"),
-    [(">&-", [], 0), ("2>&-", ["--time-limit", "-1"], 2), (">&- 2>&-", [], 0)],
+    [
+        (">&-", [], 0),
+        ("2>&-", ["--time-limit", "-1"], 2),
+        (">&- 2>&-", [], 0),
+        (">/dev/full 2>/dev/full", [], 2),
+    ],
 )
 def test_a_closed_stream_is_no_verdict(
     closed: str, more: list[str], status: int, planned: Path
 ) -> None:
-    """Whoever wants no output hears the status alone."""
+    """Whoever wants no output, or has no room for it, hears the status alone."""
     script = "import sys; from vdsm_pin.cli import main; main(sys.argv[1:])"
     words = ["verify", "near.yaml", "--trajectory", "trajectory.csv", "--out", "mute"]
     run = [sys.executable, "-c", script, *words, *more]

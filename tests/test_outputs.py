@@ -6,15 +6,19 @@ Oracle: the bytes of the inputs before and after.
 import os
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from vdsm_pin import api
 from vdsm_pin.app import arm_subject
+from vdsm_pin.app.workflow import planned_by
 from vdsm_pin.batch.folders import folder_names
-from vdsm_pin.batch.run import OWN, Batch, run_batch
-from vdsm_pin.batch.task import Settings
+from vdsm_pin.batch.manifest import finished
+from vdsm_pin.batch.run import OWN, Batch, run_batch, seconds_of
+from vdsm_pin.batch.task import MANIFEST, TIMING, Settings, Task
+from vdsm_pin.batch.worker import perform
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile
 
@@ -38,6 +42,7 @@ endloop
 endfacet
 endsolid part
 """
+FEWEST = Settings("fewest")
 INPUTS = ("problem.yaml", "part.stl", "motion.csv", "plan.json")
 
 
@@ -272,6 +277,21 @@ def test_nothing_takes_the_place_of_a_pipe(
         api.write_trajectory(pipes[0], motion)
     assert capsys.readouterr().err.count("is not a regular file") == 4
     assert all(pipe.is_fifo() for pipe in pipes)
+
+
+def test_no_pipe_is_waited_for(here: Path) -> None:
+    """Where results lie, beside a motion, and where a motion is given."""
+    for name in (TIMING, MANIFEST, "motion.csv.pipe"):
+        os.mkfifo(here / name)
+    (here / "plan.json").unlink()
+    os.mkfifo(here / "plan.json")
+    given, final = str(here / "motion.csv.pipe"), here / "b"
+    task = Task(str(here / "problem.yaml"), here, here / "aside", FEWEST)
+    assert finished(task, "", {}) is None
+    assert seconds_of(here) is None
+    assert planned_by(here / "motion.csv") is None
+    done = perform(replace(task, final=final, trajectory=given))
+    assert done.row.reason.endswith("motion.csv.pipe: is not a regular file")
 
 
 def test_a_batch_writes_over_no_table_of_others(here: Path) -> None:

@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from vdsm_pin.app import repair as app_repair
 from vdsm_pin.app.motions import MotionOptions
-from vdsm_pin.app.workflow import Verified, VerifyOrder
+from vdsm_pin.app.subjects import subject_of
+from vdsm_pin.app.workflow import Given, Verified, VerifyOrder
 from vdsm_pin.arm.kinematics import joint_centres, tip_jacobian
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.cli import app
@@ -224,16 +225,22 @@ def test_command_repairs_what_it_is_given(tmp_path: Path) -> None:
 def test_a_repaired_motion_that_is_not_proved_as_written_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As where the time ends between finding it and verifying what was written."""
-    given, verify = tmp_path / "t.csv", app_repair.verify_to_folder
+    """As where the time ends between finding it and verifying what was written.
+
+    Nothing is written then.
+    """
+    given, verify = tmp_path / "t.csv", app_repair.verify_aside
     write_trajectory(given, planned("paper/free")[1])
 
-    def late(order: VerifyOrder) -> Verified:
-        return verify(replace(order, options=MotionOptions(Deadline.after(0.0))))
+    def late(order: VerifyOrder, motion: Given, aside: Path) -> Verified:
+        order = replace(order, options=MotionOptions(Deadline.after(0.0)))
+        subject = subject_of(order.problem, order.options)
+        return verify(order, motion._replace(subject=subject), aside)
 
-    monkeypatch.setattr(app_repair, "verify_to_folder", late)
+    monkeypatch.setattr(app_repair, "verify_aside", late)
     words = ["repair", "paper/free", "--trajectory", str(given), "--out"]
     ended = CliRunner().invoke(app, [*words, str(tmp_path / "o")], obj="vdsm repair")
     assert ended.exit_code == 1
     assert isinstance(ended.exception, Infeasible)
     assert "the repaired motion, as written" in str(ended.exception)
+    assert not list((tmp_path / "o").iterdir())

@@ -6,14 +6,15 @@ from typing import Final
 
 from vdsm_pin import __version__
 from vdsm_pin.app.motions import MotionOptions
-from vdsm_pin.app.subjects import subject_of
-from vdsm_pin.app.workflow import JUDGED, TRAJECTORY, VerifyOrder, verify_to_folder
-from vdsm_pin.errors import Infeasible
-from vdsm_pin.io.source import (
-    check_is_file_or_bag,
-    check_unchanged,
-    sha256_of_file,
+from vdsm_pin.app.workflow import (
+    JUDGED,
+    TRAJECTORY,
+    VerifyOrder,
+    read_given,
+    verify_aside,
 )
+from vdsm_pin.errors import Infeasible
+from vdsm_pin.io.source import check_unchanged, sha256_of_file
 from vdsm_pin.repair.rounds import Repaired
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.verification.records import Verdict, Verification
@@ -39,11 +40,9 @@ def repair_to_folder(
     """
     inputs = [*order.problem.files, order.trajectory]
     check_output_folder(order.folder)
-    check_is_file_or_bag(order.trajectory)
-    digest = sha256_of_file(order.trajectory)
     check_kept([order.folder / n for n in (TRAJECTORY, REPAIR, *JUDGED)], inputs)
-    subject = subject_of(order.problem, order.options)
-    found = subject.repair(subject.read(order.trajectory), pinned)
+    motion, digest, subject = read_given(order)
+    found = subject.repair(motion, pinned)
     check_unchanged(order.trajectory, digest)
     rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
     content = {
@@ -59,10 +58,10 @@ def repair_to_folder(
     with staged(order.folder) as aside:
         subject.write(aside / TRAJECTORY, subject.motion_of(found.verification))
         (aside / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
-    options = MotionOptions(deadline=order.options.deadline)
-    written = order.folder / TRAJECTORY
-    verified = verify_to_folder(replace(order, trajectory=written, options=options))
-    if verified.records.verdict is not Verdict.CERTIFIED:
-        message = f"{written}: the repaired motion, as written: {verified.file.reason}"
-        raise Infeasible(message)
+        options = MotionOptions(deadline=order.options.deadline)
+        again = replace(order, trajectory=aside / TRAJECTORY, options=options)
+        verified = verify_aside(again, read_given(again), aside)
+        if verified.records.verdict is not Verdict.CERTIFIED:
+            message = f"the repaired motion, as written: {verified.file.reason}"
+            raise Infeasible(message)
     return found

@@ -7,7 +7,7 @@ import math
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from pydantic import ValidationError
 
@@ -23,6 +23,7 @@ from vdsm_pin.errors import (
 from vdsm_pin.io.source import (
     check_is_file_or_bag,
     check_unchanged,
+    read_text,
     sha256_of_file,
 )
 from vdsm_pin.io.trajectory_file import write_trajectory
@@ -55,6 +56,9 @@ REPORT: Final = "report.html"
 CLEARANCE: Final = "clearance.csv"
 
 NO_PLAN: Final = "no_plan.html"
+
+MAX_PLAN_BYTES: Final = 64 << 20
+"""Of a plan.json, which names stretches that are not drawn and margins; [bytes]."""
 
 PLANNED: Final = TRAJECTORY, PLAN, CENTRES, CABLES, REPORT, NO_PLAN
 """What planning writes to its folder: all but the last, or the last alone."""
@@ -190,26 +194,55 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
         InvalidInput: If a file is bad or the folder cannot be written.
         VerificationFailed: If a check could not be carried out.
     """
-    # Pages are written by jinja2, which nobody else waits for.
-    from vdsm_pin.report.html import write_report
-
     _check_outputs(order)
+    given = read_given(order)
+    with staged(order.folder) as aside:
+        verified = verify_aside(order, given, aside)
+    if order.pdf is not None:
+        print_page(order.folder / REPORT, order.pdf)
+    return verified
+
+
+class Given(NamedTuple):
+    """A trajectory file as it was read, its SHA-256, and who judges it."""
+
+    motion: Any
+    sha256: str
+    subject: Subject
+
+
+def read_given(order: VerifyOrder) -> Given:
+    """The trajectory of an order.
+
+    Raises:
+        InvalidInput: If it is bad.
+    """
     check_is_file_or_bag(order.trajectory)
     digest = sha256_of_file(order.trajectory)
     subject = subject_of(order.problem, order.options)
-    motion = subject.read(order.trajectory)
-    with staged(order.folder) as aside:
-        verification = _judged(order, subject, motion, aside)
-        check_unchanged(order.trajectory, digest)
-        source, urdf = order.problem.source, subject.urdf_sha256
-        record = RunRecord.of(order.command, source, urdf, digest, order.date)
-        file = verification_file(verification, record)
-        (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
-        write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
-        # Last inside: a certificate that cannot be written leaves no half of a result.
-        missing = _certify(order, subject, verification, record)
-    if order.pdf is not None:
-        print_page(order.folder / REPORT, order.pdf)
+    return Given(subject.read(order.trajectory), digest, subject)
+
+
+def verify_aside(order: VerifyOrder, given: Given, aside: Path) -> Verified:
+    """Verify a trajectory; all but the certificate and the PDF goes to a folder aside.
+
+    Raises:
+        InvalidInput: If the file has changed since it was read.
+        VerificationFailed: If a check could not be carried out.
+    """
+    # Pages are written by jinja2, which nobody else waits for.
+    from vdsm_pin.report.html import write_report
+
+    motion, digest, subject = given
+    verification = _judged(order, subject, motion, aside)
+    check_unchanged(order.trajectory, digest)
+    source, urdf = order.problem.source, subject.urdf_sha256
+    record = RunRecord.of(order.command, source, urdf, digest, order.date)
+    file = verification_file(verification, record)
+    (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
+    write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
+    # Last inside: a certificate that cannot be written leaves no half of a result.
+    missing = _certify(order, subject, verification, record)
     return Verified(file, verification, missing)
 
 
@@ -244,8 +277,9 @@ def planned_by(trajectory: Path) -> PlanFile | None:
     """plan.json beside a trajectory, if it belongs to exactly this trajectory."""
     beside = trajectory.parent / PLAN
     try:
-        plan = PlanFile.model_validate_json(beside.read_text(encoding="utf-8"))
-    except (OSError, ValidationError, UnicodeDecodeError):
+        text = read_text(beside, limit=MAX_PLAN_BYTES)
+        plan = PlanFile.model_validate_json(text)
+    except (InvalidFile, ValidationError):
         return None
     same = plan.hashes.trajectory_sha256 == sha256_of_file(trajectory)
     return plan if same else None

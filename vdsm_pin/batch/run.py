@@ -11,10 +11,12 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
+from pydantic import ValidationError
+
 from vdsm_pin.app.workflow import NO_PLAN, REPORT
 from vdsm_pin.batch.folders import folder_names, jobs_by_name
 from vdsm_pin.batch.inputs import expanded, motions
-from vdsm_pin.batch.manifest import write_manifest
+from vdsm_pin.batch.manifest import MAX_BYTES, write_manifest
 from vdsm_pin.batch.pool import Ended, run_tasks
 from vdsm_pin.batch.progress import progress
 from vdsm_pin.batch.task import (
@@ -29,10 +31,11 @@ from vdsm_pin.batch.task import (
 from vdsm_pin.batch.worker import perform
 from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text, writing
+from vdsm_pin.io.source import read_text
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.columns import COLUMNS, write_columns
-from vdsm_pin.report.files import BatchRow
+from vdsm_pin.report.files import BatchRow, TimingFile
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
@@ -209,7 +212,7 @@ def _settle(ended: Ended[Task, Done]) -> Done:
 def _write_summaries(batch: Batch, rows: list[BatchRow]) -> None:
     folder = batch.folder
     ordered = sorted(rows, key=lambda row: row.folder)
-    seconds = {row.folder: _seconds(folder / row.folder) for row in ordered}
+    seconds = {row.folder: seconds_of(folder / row.folder) for row in ordered}
     known = {name: value for name, value in seconds.items() if value is not None}
     script = f"window.vdsmTiming = {json.dumps(known, indent=1)};\n"
     with staged(folder, folder / _ASIDE) as aside:
@@ -230,11 +233,12 @@ def _pages(batch: Batch, rows: list[BatchRow]) -> dict[str, str]:
     }
 
 
-def _seconds(folder: Path) -> float | None:
+def seconds_of(folder: Path) -> float | None:
+    """What the problem of a folder took, by its own file; None where there is none."""
     try:
-        content = json.loads((folder / TIMING).read_text(encoding="utf-8"))
-        return float(content["seconds"])
-    except (OSError, ValueError, KeyError, TypeError):
+        text = read_text(folder / TIMING, limit=MAX_BYTES)
+        return TimingFile.model_validate_json(text).seconds
+    except (InvalidFile, ValidationError):
         return None
 
 

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import suppress
 from typing import Final, NoReturn
 
 import typer
@@ -16,8 +17,9 @@ PIPE_CLOSED: Final = 141
 
 def fail(error: Exception, status: int) -> NoReturn:
     """Say what went wrong, and end."""
-    for one in (error, *getattr(error, "others", ())):
-        typer.echo(printable(f"vdsm: {one}"), err=True)
+    with suppress(OSError):  # of a disk that is full, say; the status still tells
+        for one in (error, *getattr(error, "others", ())):
+            typer.echo(printable(f"vdsm: {one}"), err=True)
     sys.exit(status)
 
 

@@ -218,9 +218,14 @@ def files_in(path: Path) -> list[Path]:
 
 
 def sha256_of_file(path: Path) -> str:
-    """SHA-256 of a file's bytes, or of those in a bag's folder, in hexadecimal."""
+    """SHA-256 of a file's bytes, or of those in a bag's folder, in hexadecimal.
+
+    Raises:
+        InvalidFile: If it is no regular file: a pipe or a device may have no end.
+    """
     digest = hashlib.sha256()
     for one in files_in(path):
+        check_is_file(one)
         with one.open("rb") as file:
             hashlib.file_digest(file, lambda: digest)
     return digest.hexdigest()
