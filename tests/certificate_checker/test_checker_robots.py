@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from flint import arb, ctx
 from oracles.certificate_cases import write_cube
 from oracles.certificate_mutations import change_number, changes
@@ -22,7 +23,7 @@ from vdsm_pin.certificate_checker.balls import SLACK, Rejected
 from vdsm_pin.certificate_checker.robot import Model, within
 from vdsm_pin.certificate_checker.tree import Tree
 from vdsm_pin.cli import main
-from vdsm_pin.robots.files import RobotFiles
+from vdsm_pin.robots.files import MeshCover, RobotFiles
 from vdsm_pin.robots.urdf import read_robot
 
 Rng = np.random.Generator
@@ -179,6 +180,46 @@ def test_accelerations_keep_their_limits(
         outcome = made.check(copy.deepcopy(lines))
         assert outcome.accepted is good
         assert good or "the limit of its rates" in outcome.reason
+
+
+@pytest.mark.parametrize("smooth", range(3))
+@pytest.mark.parametrize("row", [1, 2])
+def test_times_that_do_not_rise_are_refused(
+    tmp_path: Path, smooth: int, row: int
+) -> None:
+    made = timed(tmp_path, smooth)
+    lines = made.certified()
+    at = made.rows[0].index("time_s")
+    made.rows[1 + row][at] = made.rows[row][at]
+    assert "times do not rise" in made.check(lines).reason
+
+
+SHAPED = """<robot name="r"><link name="l"><collision><origin xyz="-2 0 0"/>
+<geometry>{}</geometry></collision></link></robot>"""
+BALL = {"origin_m": [0.75, 0.0, 0.0], "edges_m": [], "radius_m": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("shape", "cover", "extent"),
+    [
+        ('<mesh filename="m.stl"/>', "hull", 1.0 + (3.0 + 2.0)),
+        ('<mesh filename="m.stl"/>', "primitives", 0.75 + (1.0 + 0.5) + 0.5),
+        ('<box size="6 1 1"/>', "hull", 5.0 + (3.0 + 2.0)),
+        ('<sphere radius="0.5"/>', "hull", 2.0 + (0.0 + 2.0) + 0.5),
+        ('<cylinder radius="0.5" length="6"/>', "hull", 3.0 + (3.0 + 2.0) + 0.5),
+    ],
+)
+def test_the_extent_of_a_link_is_that_of_all_it_is_worked_out_of(
+    tmp_path: Path, shape: str, cover: Any, extent: float
+) -> None:
+    """A box whose corners are at 3 m at most, and then 2 m farther back."""
+    mesh = trimesh.creation.box((0.5, 0.5, 0.5)).apply_translation([2.75, 0.0, 0.0])
+    mesh.export(tmp_path / "m.stl")
+    (tmp_path / "r.urdf").write_text(SHAPED.format(shape))
+    files = RobotFiles(tmp_path / "r.urdf", solids=MeshCover(cover))
+    (found,) = Model(files, np.eye(4)).links()
+    told = {"l": {"order": [], "meshes": [BALL]}} if cover == "primitives" else {}
+    assert found(told).extent == pytest.approx(extent, rel=1e-12)
 
 
 @pytest.mark.parametrize(("cover", "parts", "most"), [("hull", 9, 1), ("parts", 3, 3)])
