@@ -50,13 +50,13 @@ def test_pieces_of_a_prism_are_no_more_corners_than_its_triangles() -> None:
 
 
 def test_boundaries_cancel_where_loops_run_both_ways() -> None:
-    assert boundary([[0, 1, 2]]) == {(0, 1): 1, (1, 2): 1, (0, 2): -1}
+    assert boundary([[0, 1, 2]]) == {(0, 1): 1, (1, 2): 1, (2, 0): 1}
     assert boundary([[0, 1, 2], [2, 1, 0]]) == {}
     halves = boundary([[0, 1, 2], [0, 2, 3]])
     assert halves == boundary([[0, 1, 2, 3]])
     assert halves != boundary([[0, 1, 2], [0, 3, 2]])
     assert boundary([[0, 0, 1, 2, 2]]) == boundary([[0, 1, 2]])
-    assert boundary([[0, 1, 2]] * 2) == {(0, 1): 2, (1, 2): 2, (0, 2): -2}
+    assert boundary([[0, 1, 2]] * 2) == {(0, 1): 2, (1, 2): 2, (2, 0): 2}
 
 
 def test_the_extent_is_that_of_the_points_and_where_they_come_from() -> None:

@@ -49,6 +49,15 @@ def refusal(path: Path) -> str:
     return str(caught.value)
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_the_size_of_a_flat_mesh_counts_too(axis: int, tmp_path: Path) -> None:
+    file = problem(tmp_path, 1e-3)
+    flat = TETRAHEDRON * 1e-3
+    flat[..., axis] = 0.0
+    (tmp_path / "part.stl").write_bytes(binary_stl(flat))
+    assert "try scale: 1000" in refusal(file)
+
+
 def extent(mesh: Mesh) -> float:
     """Longest distance of two vertices: the tetrahedron's is sqrt(2) edges; [m]."""
     away = mesh.vertices[:, None] - mesh.vertices[None]

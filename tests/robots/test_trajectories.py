@@ -226,6 +226,8 @@ POINT = '{{"positions": [{}, 0], {}"time_from_start": {}}}'
         ('"accelerations": [0, 1], ', 1, "accelerations, expected velocities too"),
         ("", '{"sec": 1, "nsec": 5}', "time_from_start: is .*expected seconds"),
         ("", "{}", "time_from_start: is .*expected seconds"),
+        ("", '{"sec": 1, "secs": 2}', "time_from_start: is .*expected seconds"),
+        ("", '{"sec": 1, "nsecs": 5}', "time_from_start: is .*expected seconds"),
         ('"velocities": [0, 0], ', 0, None),
         ('"velocities": [0, 0], "accelerations": [0, 1], ', 1, None),
     ],
@@ -245,6 +247,24 @@ def test_rates_without_what_they_need_are_refused(
         return
     with pytest.raises(InvalidFile, match=said):
         read_path(file, robot)
+
+
+@pytest.mark.parametrize(
+    ("stated", "seconds"),
+    [
+        *[(1.25, 1.25), ({"sec": 2, "nanosec": 5}, 2.000000005), ({"sec": 3}, 3.0)],
+        *[({"secs": 2, "nsecs": 5}, 2.000000005), ({"nsecs": 7}, 7e-9)],
+        ({"nanosec": 250_000_000}, 0.25),
+    ],
+)
+def test_times_are_seconds_or_durations_of_either_ros(
+    stated: object, seconds: float
+) -> None:
+    points = [{"positions": [0.0]}, {"positions": [0.0], "time_from_start": stated}]
+    points[0]["time_from_start"] = 0  # type: ignore[assignment]
+    found = of_message(Path("t"), {"joint_names": ["a"], "points": points})
+    assert found.times is not None
+    assert found.times.tolist() == [0.0, pytest.approx(seconds, rel=1e-15)]
 
 
 ODD = {

@@ -121,16 +121,13 @@ def away(points: Any, off: float) -> float:
 
 
 def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
-    """How often loops run along each edge, forwards less backwards, where not equal.
+    """How much oftener loops run along each edge than back.
 
     Loops of the same boundary wind round each point equally often in sum. A polygon
     winds round every point of its inside, so one of the loops does: its hull has it.
     """
-    chain: Counter[tuple[int, int]] = Counter()
-    for loop in loops:
-        for i, j in pairwise([*loop, loop[0]]):
-            chain[min(i, j), max(i, j)] += (i < j) - (j < i)
-    return {edge: times for edge, times in chain.items() if times}
+    ahead = Counter(pair for loop in loops for pair in pairwise([*loop, loop[0]]))
+    return ahead - Counter((j, i) for i, j in ahead.elements())
 
 
 def hulls(name: str, corners: Any, groups: Any, inside: bool = True) -> list[Any]:

@@ -98,7 +98,7 @@ class MeshSize:
             InvalidFile: If the mesh is far too large or small; or rather small, taken
                 in millimetres without a word, and of a usual size in metres.
         """
-        if not self.extents.any():  # a single point
+        if not self.diagonal:  # a single point
             return
         low, high = TOLERANCES.mesh_size_low, TOLERANCES.mesh_size_high
         ratio = self.diagonal / arm_length

@@ -19,8 +19,8 @@ MAX_BYTES: Final = 256 << 20
 MULTI: Final = "multi_dof_joint_trajectory"
 _FREE: Final = ("x", "y", "z", "yaw", "pitch", "roll")
 _NANO: Final = 1e-9
-_TIME: Final = {"sec", "secs", "nanosec", "nsecs"}
-"""Keys of a duration in ROS 1 and 2."""
+_TIMES: Final = ("sec", "nanosec"), ("secs", "nsecs")
+"""Keys of a duration in ROS 2, and in ROS 1."""
 
 
 def read_joint_trajectory(file: Path) -> JointTrajectory:
@@ -136,9 +136,9 @@ def _times(file: Path, points: list[Any]) -> FloatArray | None:
     times = []
     for k, stated in enumerate(found):
         time = [stated]
-        if isinstance(stated, dict) and stated and stated.keys() <= _TIME:
-            part = stated.get("nanosec", stated.get("nsecs", 0))
-            time = [stated.get("sec", stated.get("secs", 0)), part]
+        for keys in _TIMES:
+            if isinstance(stated, dict) and stated and stated.keys() <= {*keys}:
+                time = [stated.get(key, 0) for key in keys]
         numbers = finite_numbers(time, len(time))
         if numbers is None:
             where = f"points[{k}].time_from_start"

@@ -10,6 +10,7 @@ area or crosses itself; it stays a fan, which covers every point the face winds 
 
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -134,9 +135,6 @@ def _cut(points: FloatArray, normal: FloatArray) -> IntArray | None:
 
 
 def _edges(loops: list[list[int]]) -> dict[tuple[int, int], int]:
-    """How often loops run along each edge, forwards less backwards, where not equal."""
-    chain: Counter[tuple[int, int]] = Counter()
-    for loop in loops:
-        for i, j in zip(loop, [*loop[1:], loop[0]], strict=True):
-            chain[min(i, j), max(i, j)] += (i < j) - (j < i)
-    return {edge: times for edge, times in chain.items() if times}
+    """How much oftener loops run along each edge than back."""
+    ahead = Counter(pair for loop in loops for pair in pairwise([*loop, loop[0]]))
+    return ahead - Counter((j, i) for i, j in ahead.elements())
