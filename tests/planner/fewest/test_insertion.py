@@ -593,22 +593,3 @@ def test_thin_links_pass_where_thick_ones_do_not() -> None:
     assert plan.undrawn == ()
     found = verify(task, plan.trajectory, load_robot(arm))
     assert found.verdict is Verdict.CERTIFIED
-
-
-def test_a_way_is_shifted_until_the_arm_that_follows_it_is_clear() -> None:
-    """Through a window little wider than the body, then to the side at once."""
-    arm, half = equal_links(12), 0.058
-    task = problem(*wall(0.4, 0.0, 0.0, half), points=LOOP, start=(0.0, 0.0, 0.0))
-    task = replace(task, manipulator=arm)
-    space, goal = space_of(task), np.array([1.6, -0.8, 0.1])
-    start = np.outer(arm.stations - arm.total_length, [1.0, 0.0, 0.0])
-
-    def least(route: FloatArray) -> float:
-        laid = led_along(route, start, arm.link_lengths)
-        return float(link_clearance(task)(laid).min())
-
-    (route,) = space.routes(goal, 1)
-    shifted = space.followable(route)
-    assert least(route) < task.required_clearance <= least(shifted)
-    np.testing.assert_array_equal(shifted[[0, -1]], route[[0, -1]])
-    np.testing.assert_array_equal(space_of(task).followable(route), shifted)

@@ -1,9 +1,7 @@
 """Ways of the tip shortened, pulled to the middle of openings, and refined there.
 
 An elastic band (Quinlan 1994): what it is worth counts the room at its points, and that
-of the chords which an arm lays on it. Where that is not enough, it is shifted by smooth
-bumps until the arm that follows it is clear as a whole: a stochastic descent, as in
-STOMP (Kalakrishnan 2011). Nothing is proved here.
+of the chords which an arm lays on it. Nothing is proved here.
 """
 
 from typing import Final
@@ -12,8 +10,6 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.planner.fewest.follow_the_leader import led_along
-from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.fewest.tip_room import LEAST, NARROW, TipRoom
 from vdsm_pin.problem.pointing import angles_between
 
@@ -33,24 +29,6 @@ STEEP_COST: Final = 4.0
 """What a way is worse for each part of that angle that it bends more; [-]."""
 BOW: Final = 0.2
 """Part of the room of a narrow place that the way between two points may bow; [-]."""
-BUMPS: Final = 1500
-"""Bumps tried on a way for the arm that follows it."""
-TRIED: Final = 150
-"""After so many it is seen whether they were worth it."""
-WORTH: Final = 0.95
-"""They were not where more than this part is still lacking; [-]."""
-WIDTHS: Final = (1.0, 2.0, 4.0, 8.0)
-"""How wide they are, in points; [-]."""
-HEIGHTS: Final = (0.03, 0.1, 0.3)
-"""How high, over the body's radius; [-]."""
-RESERVE: Final = 0.05
-"""More clearance that the arm shall have, over the body's radius; [-]."""
-EASE: Final = 0.95
-"""Part of the largest link angle that it shall bend by at most; [-]."""
-BEND_COST: Final = 3.0
-"""What a joint counts for each part of that angle it bends more; [-]."""
-NO_ARM: Final = 50.0
-"""What a point counts at which no arm can follow; [-]."""
 
 
 def shortened(room: TipRoom, route: FloatArray) -> FloatArray:
@@ -115,49 +93,6 @@ def pulled(
                 shifts = rng.normal(size=(len(inner), SHIFTS, 3)) * size
                 route[inner] = _better(room, route, inner, shifts)
     return route
-
-
-def followable(room: TipRoom, route: FloatArray, start: FloatArray) -> FloatArray:
-    """A way shifted until the arm that follows it is clear, or nearly so.
-
-    Args:
-        room: Clearance function and arm.
-        route: Shape (k, 3), its ends stay; [m].
-        start: Joint centres at its first point, shape (N + 1, 3); [m].
-    """
-    if len(route) < 3:
-        return route
-    rng, number = np.random.default_rng(len(route)), np.arange(len(route))
-    room = room.near
-    lack = before = _lack(room, route, start)
-    for count in range(1, BUMPS + 1):
-        if lack == 0.0:
-            break
-        if count % TRIED == 0:
-            if lack > WORTH * before:
-                break
-            before = lack
-        middle, width = rng.integers(1, len(route) - 1), rng.choice(WIDTHS)
-        bump = np.exp(-0.5 * ((number - middle) / width) ** 2)
-        bump[0] = bump[-1] = 0.0
-        height = room.arm.most_radius * rng.choice(HEIGHTS)
-        trial = route + bump[:, None] * rng.normal(size=3) * height
-        lacks = _lack(room, trial, start)
-        if lacks < lack:
-            route, lack = trial, lacks
-    return route
-
-
-def _lack(room: TipRoom, route: FloatArray, start: FloatArray) -> float:
-    """What the arm that follows a way lacks of clearance and bends too much; [-]."""
-    arm = room.arm
-    laid = led_along(route, start, arm.link_lengths)
-    laid = laid[np.isfinite(laid).all(axis=(1, 2))]
-    spare = (room.clearance(laid) - room.required) / arm.most_radius
-    narrow = np.clip(RESERVE - spare, 0.0, 1.0).sum()
-    steep = np.maximum(bends_of(laid) / arm.max_link_angle - EASE, 0.0).sum()
-    missing = NO_ARM * (len(route) - len(laid))
-    return float(narrow + BEND_COST * steep + missing)
 
 
 def _better(

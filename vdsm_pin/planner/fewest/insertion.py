@@ -218,20 +218,14 @@ class _Search:
     def _routes(self, path: FloatArray) -> Iterator[FloatArray]:
         """Ways of the tip to a path's first point, also by way of points after it.
 
-        Who comes from there arrives in a posture that goes on to there. Where nothing
-        else did, ways come last as the whole arm can follow them.
+        Who comes from there arrives in a posture that goes on to there.
         """
-        routes = list[FloatArray]()
-        for route in self.space.routes(path[0], self.effort.routes):
-            routes.append(route)
-            yield route
+        yield from self.space.routes(path[0], self.effort.routes)
         yield from self.space.swing(path[0])
         for ahead in AHEAD:
             if ahead < len(path):
                 for route in self.space.routes(path[ahead], 1):
                     yield np.vstack([route, path[ahead - 1 :: -1]])
-        if self.effort.led:
-            yield from map(self.space.followable, routes)
 
     def _corners(self, visits: list[_Visit]) -> Corners:
         """The visits one after the other, out by the way in after all but the last."""

@@ -15,7 +15,6 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.elastic_band import (
-    followable,
     pulled,
     refined,
     resampled,
@@ -23,7 +22,6 @@ from vdsm_pin.planner.fewest.elastic_band import (
 )
 from vdsm_pin.planner.fewest.tip_cells import TipCells
 from vdsm_pin.planner.fewest.tip_room import TipRoom
-from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.tolerances import TOLERANCES
@@ -49,13 +47,11 @@ class TipSpace:
         most: int,
     ) -> None:
         self.arm, self.start = problem.manipulator, problem.path.start
-        self.centres = start_centres(problem)
         self.room = TipRoom(self.arm, clearance, required)
         self.spacing, self.most = spacing, most
         self.stuck: list[FloatArray] = []
         self.known: dict[bytes, list[FloatArray]] = {}
         self.searches: dict[bytes, Iterator[FloatArray]] = {}
-        self.shifted: dict[bytes, FloatArray] = {}
 
     def routes(self, goal: FloatArray, most: int) -> Iterator[FloatArray]:
         """Ways of the tip from the start to a goal, the best first.
@@ -76,13 +72,6 @@ class TipSpace:
             if number == len(known):
                 return
             yield known[number]
-
-    def followable(self, route: FloatArray) -> FloatArray:
-        """A way shifted until the arm that follows it is clear, if that can be."""
-        key = route.tobytes()
-        if key not in self.shifted:
-            self.shifted[key] = followable(self.room, route, self.centres)
-        return self.shifted[key]
 
     def _search(self, goal: FloatArray) -> Iterator[FloatArray]:
         """Ways to a goal without end, as long as there are any."""
