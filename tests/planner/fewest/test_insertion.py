@@ -18,24 +18,27 @@ from benchmarks.hrm2000.sweeps import Sweep, least_bore
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
+from vdsm_pin.planner.fewest import elastic_band
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.elastic_band import resampled
 from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.growth import Layers, Population
-from vdsm_pin.planner.fewest.insertion import insert, tip_space
+from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.fewest.tip_room import TipRoom
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -271,14 +274,55 @@ def test_the_way_through_a_bent_tube_is_one_that_an_arm_can_follow() -> None:
         ]
     ]
     task = bent_tube(-0.2, 0.008, *bends)
-    effort = Insert(population=10, routes=1, backtracks=2, seed=0, cells=60_000)
-    judge = judge_of(task)
-    space = tip_space(judge, broad_phase(task, link_clearance(task)), effort)
-    (route,) = space.routes(task.path.points[0], 1)
+    (route,) = space_of(task).routes(task.path.points[0], 1)
     start = np.zeros((ARM.n_links + 1, 3))
     start[:, 0] = ARM.stations - ARM.total_length - 0.2
     arms = led_along(route, start, ARM.link_lengths)
     assert link_clearance(task)(arms).min() >= task.required_clearance
+
+
+def best_of_all(
+    room: TipRoom, route: FloatArray, inner: IntArray, shifts: FloatArray
+) -> FloatArray:
+    """What `_better` finds, with all room asked for."""
+    middle = (route[inner - 1] + route[inner + 1])[:, None] / 2.0
+    own, radius = route[inner][:, None], room.arm.most_radius
+    tried = np.concatenate([own, (own + middle) / 2.0, middle, own + shifts], axis=1)
+    back, ahead = (
+        np.broadcast_to(ends[:, None], tried.shape)
+        for ends in elastic_band._chords(room.arm, route, inner)
+    )
+    at, *chords = (
+        room.spare(tried.reshape(-1, 3), ends.reshape(-1, 3)).reshape(tried.shape[:2])
+        / (elastic_band.NARROW * radius)
+        for ends in (tried, back, ahead)
+    )
+    score = np.where(at > 0.0, 2.0 * np.minimum(at, 1.0), 10.0 * (at - 1.0))
+    score += elastic_band.CHORDS * np.clip(np.minimum(*chords), -1.0, 1.0)
+    score -= np.linalg.norm(tried - middle, axis=2) / radius
+    turn = angles_between(tried - back, ahead - tried) / room.arm.max_link_angle
+    score -= elastic_band.STEEP_COST * np.maximum(turn - elastic_band.STEEP, 0.0)
+    return np.asarray(tried[np.arange(len(inner)), score.argmax(axis=1)])
+
+
+def test_a_way_is_pulled_as_by_all_the_room_and_less_of_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    room, asked = space_of(two_windows(0.075)).room, [0]
+    windows = np.array([[0.65, -0.06, 0.05], [1.3, -0.15, 0.12]])
+    route = resampled(np.vstack([START, windows, LOOP[:1]]), 0.06)
+    spare = TipRoom.spare
+
+    def counted(self: TipRoom, *places: FloatArray) -> FloatArray:
+        asked[-1] += len(places[0])
+        return spare(self, *places)
+
+    monkeypatch.setattr(TipRoom, "spare", counted)
+    few = elastic_band.pulled(room, route)
+    asked.append(0)
+    monkeypatch.setattr(elastic_band, "_better", best_of_all)
+    np.testing.assert_allclose(few, elastic_band.pulled(room, route), atol=1e-9)
+    assert asked[0] < 0.75 * asked[1]
 
 
 def test_an_arm_led_along_a_curve_lies_on_it() -> None:

@@ -102,25 +102,60 @@ def _better(
 
     An arm that follows a way lays its links as chords on it, which bow to the
     inside of a bend: a place is the better the more room the chords have that end
-    there, and the less one turns against the other.
+    there, and the less one turns against the other. Room is asked for only where it
+    can make a place better than those before.
     """
     middle = (route[inner - 1] + route[inner + 1])[:, None] / 2.0
     own, radius = route[inner][:, None], room.arm.most_radius
     tried = np.concatenate([own, (own + middle) / 2.0, middle, own + shifts], 1)
-    shape, places = tried.shape[:2], tried.reshape(-1, 3)
-    back, ahead = (
-        np.repeat(ends, shape[1], axis=0) for ends in _chords(room.arm, route, inner)
-    )
-    spare = room.spare(places).reshape(shape)
-    wide = np.minimum(spare / (NARROW * radius), 1.0)
-    score = np.where(spare > 0.0, 2.0 * wide, 10.0 * (wide - 1.0))
-    chords = np.minimum(room.spare(places, back), room.spare(places, ahead))
-    chords = np.clip(chords.reshape(shape) / (NARROW * radius), -1.0, 1.0)
-    turn = angles_between(places - back, ahead - places).reshape(shape)
+    back, ahead = (ends[:, None] for ends in _chords(room.arm, route, inner))
+    turn = angles_between(tried - back, ahead - tried)
     steep = np.maximum(0.0, turn / room.arm.max_link_angle - STEEP)
-    bow = np.linalg.norm(tried - middle, axis=2) / radius
-    score += CHORDS * chords - bow - STEEP_COST * steep
-    return np.asarray(tried[np.arange(len(inner)), score.argmax(axis=1)])
+    cost = np.linalg.norm(tried - middle, axis=2) / radius + STEEP_COST * steep
+    best, least = np.zeros(len(inner), np.int64), np.full(len(inner), -np.inf)
+    for columns in (slice(0, 1), slice(1, 3), slice(3, None)):
+        score = np.full(cost.shape, -np.inf)
+        some = cost[:, columns] < (2.0 + CHORDS - least)[:, None]
+        row, column = np.nonzero(some)
+        column += columns.start
+        score[row, column] = _room_worth(
+            room, tried[row, column], back[row, 0], ahead[row, 0],
+            least[row] + cost[row, column],
+        ) - cost[row, column]  # fmt: skip
+        first = score.argmax(axis=1)
+        highest = score[np.arange(len(inner)), first]
+        best = np.where(highest > least, first, best)
+        least = np.maximum(highest, least)
+    return np.asarray(tried[np.arange(len(inner)), best])
+
+
+def _room_worth(
+    room: TipRoom,
+    places: FloatArray,
+    back: FloatArray,
+    ahead: FloatArray,
+    least: FloatArray,
+) -> FloatArray:
+    """What the room at places and on their chords is worth, 2 + CHORDS at most; [-].
+
+    Args:
+        room: What the tip has to spare.
+        places: Shape (n, 3); [m].
+        back: Where the chord behind each begins; [m].
+        ahead: Where the chord ahead of each ends; [m].
+        least: A worth up to which -inf will do, shape (n,); [-].
+    """
+    wide = room.spare(places) / (NARROW * room.arm.most_radius)
+    wide = np.minimum(wide, 1.0)
+    worth = np.where(wide > 0.0, 2.0 * wide, 10.0 * (wide - 1.0))
+    chords = np.ones(len(places))
+    for ends in (back, ahead):
+        asked = np.flatnonzero(worth + CHORDS * chords > least)
+        spare = room.spare(places[asked], ends[asked])
+        spare = np.clip(spare / (NARROW * room.arm.most_radius), -1.0, 1.0)
+        chords[asked] = np.minimum(chords[asked], spare)
+    worth = worth + CHORDS * chords
+    return np.where(worth > least, worth, -np.inf)
 
 
 def _chords(
