@@ -1,7 +1,10 @@
 """Proofs that no way leads to a tip, from both sides of what passes."""
 
+import itertools
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scenes_for_fewest import problem, random_problem
 from some_slow import few_of
 
@@ -10,6 +13,10 @@ from vdsm_pin.errors import CutOff
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.fewest.explore import explore
+from vdsm_pin.planner.fewest.levels import Effort, Insert, Search
+from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.impossible.cut_off import cut_off
@@ -70,6 +77,33 @@ def test_the_tip_of_a_plan_is_never_cut_off() -> None:
         task = random_problem(seed, clutter=True)
         tips = plan_fewest(task, link_clearance(task), 0.0).tip_path.points[::10]
         assert not cut_off(task, tips).any()
+
+
+def test_no_such_proof_is_tried_where_a_way_of_the_tip_is_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = []
+
+    def counted(*given: object) -> NDArray[np.bool_]:
+        asked.append(given)
+        return np.zeros(len(path_rows(task.path).tips), dtype=np.bool_)
+
+    monkeypatch.setattr("vdsm_pin.planner.fewest.explore.cut_off", counted)
+    centre = np.array([2.6, 0.5, 0.0])
+    tips = centre + np.array([[0.2, 0.0, 0.0], [0.2, 0.1, 0.0]])
+    for window, tries in ((KEEP + 0.02, 0), (KEEP - 0.02, 1)):
+        task = problem(
+            *cage(window, np.eye(3), centre), points=tips, closed=False,
+            start=(1.8, 0.0, 0.0),
+        )  # fmt: skip
+        quick = broad_phase(task, link_clearance(task))
+        insert = Insert(population=1, routes=0, backtracks=0, seed=0, cells=9000)
+        levels = Search(rounds=1, back=0.0, grow=0, around=0), insert
+        effort = Effort(levels, proves=True)
+        found = explore(task, quick, 0.0, CostWeights(), effort)
+        # What is known before any search, after the first, and what is proved.
+        assert len(list(itertools.islice(found, 3))) == 3
+        assert len(asked) == tries
 
 
 def test_a_tip_beyond_reach_or_in_an_obstacle_counts_as_cut_off() -> None:

@@ -15,7 +15,7 @@ from vdsm_pin.errors import NoWayOut
 from vdsm_pin.geometry.arrays import BoolArray
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.grown_nodes import fill
-from vdsm_pin.planner.fewest.insertion import insert, tip_space
+from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.joint_error import link_margins
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import (
@@ -139,7 +139,7 @@ def explore(
     kept = link_margins(problem.manipulator, weights.joint_error)
     stuck: NoWayOut | None = None
     inserted: Stuck | None = None
-    spaces: dict[tuple[float, float, int], TipSpace] = {}
+    spaces = _Spaces(problem, clearance, margin)
     proofs = [_cut_off, _hemmed_in] if effort.proves else []
     levels, confined = effort.levels, True
     while levels:
@@ -157,10 +157,7 @@ def explore(
         now = Outcome(judge, None, rows, proof, inserted)
         try:
             if isinstance(level, Insert):
-                key = judge.required, level.step, level.cells
-                if key not in spaces:
-                    spaces[key] = tip_space(judge, clearance, level)
-                now = _inserted(now, spaces[key], level, soon)
+                now = _inserted(now, spaces.of(level), level, soon)
                 inserted = now.stuck
             elif isinstance(level, Search):
                 found, confined = _look(judge, level, rows, proof, weights)
@@ -176,13 +173,57 @@ def explore(
             return
         if proofs and (level is first or isinstance(level, Insert)):
             # Seldom needed, so only now: can it be done at all?
-            proof = proofs.pop(0)(problem, clearance, best)
+            prove = proofs.pop(0)
+            insert_next = next(
+                one for one in (level, *levels) if isinstance(one, Insert)
+            )
+            if prove is _cut_off and _leads_there(spaces.of(insert_next), best):
+                continue
+            proof = prove(problem, clearance, best)
             best = replace(best, proof=proof)
             yield best
             if proof.closed.all():
                 return
     if best.found is None and inserted is None and stuck is not None:
         raise stuck
+
+
+class _Spaces:
+    """Ways of the tip, kept for insertions that look as finely.
+
+    Args:
+        problem: What is asked.
+        clearance: The clearance function.
+        margin: Kept beyond the required clearance; [m].
+    """
+
+    def __init__(
+        self, problem: PlanningProblem, clearance: BroadPhase, margin: float
+    ) -> None:
+        self.problem, self.clearance, self.margin = problem, clearance, margin
+        self.known: dict[tuple[float, float, int], TipSpace] = {}
+
+    def of(self, level: Insert) -> TipSpace:
+        """Those for an insertion."""
+        key = level.slack, level.step, level.cells
+        if key not in self.known:
+            length = self.problem.manipulator.total_length
+            required = self.problem.required_clearance + self.margin
+            required += level.slack * length
+            # Where it is least blocked tells where to look for a hole.
+            exact = replace(self.clearance, floor=-np.inf)
+            self.known[key] = TipSpace(
+                self.problem, exact, required, level.step * length, level.cells
+            )
+        return self.known[key]
+
+
+def _leads_there(space: TipSpace, outcome: Outcome) -> bool:
+    """Whether ways of the tip lead to all stretches that are not drawn."""
+    open_ = ~outcome.proof.closed
+    # From one row to the next the path itself leads.
+    first = open_ & ~outcome.drawn & ~np.append(False, open_[:-1])
+    return all(space.leads_to(tip) for tip in outcome.rows.tips[first])
 
 
 def _inserted(

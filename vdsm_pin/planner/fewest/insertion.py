@@ -7,13 +7,12 @@ posture. What cannot be drawn at all is skipped.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
@@ -105,15 +104,6 @@ def insert(
     route = tip_route(judge.problem, rows, closed, step, 0.0)
     search = _Search(judge, space, route, effort)
     return Inserted(search.found(soon), search.stuck())
-
-
-def tip_space(judge: Judge, clearance: BroadPhase, effort: Insert) -> TipSpace:
-    """The ways of the tip for an effort."""
-    problem = judge.problem
-    # How far a blocked place is from a clear one tells where to look for a hole.
-    exact = replace(clearance, floor=-np.inf)
-    step = effort.step * problem.manipulator.total_length
-    return TipSpace(problem, exact, judge.required, step, effort.cells)
 
 
 class _Search:

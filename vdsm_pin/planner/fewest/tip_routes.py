@@ -52,6 +52,7 @@ class TipSpace:
         self.stuck: list[FloatArray] = []
         self.known: dict[bytes, list[FloatArray]] = {}
         self.searches: dict[bytes, Iterator[FloatArray]] = {}
+        self.begun: dict[bytes, tuple[TipCells, FloatArray | None]] = {}
 
     def routes(self, goal: FloatArray, most: int) -> Iterator[FloatArray]:
         """Ways of the tip from the start to a goal, the best first.
@@ -73,20 +74,34 @@ class TipSpace:
                 return
             yield known[number]
 
+    def leads_to(self, goal: FloatArray) -> bool:
+        """Whether there is a way of the tip to a goal, shape (3,)."""
+        return not (self.start != goal).any() or self._begun(goal)[1] is not None
+
+    def _begun(self, goal: FloatArray) -> tuple[TipCells, FloatArray | None]:
+        """Cells halved so far that a way to a goal is known, if any, and that way."""
+        key = goal.tobytes()
+        if key not in self.begun:
+            cells = self._cells(np.stack([self.start, goal]))
+            cells.avoided = self.stuck
+            self.begun[key] = cells, cells.cheapest(self.start, goal)
+        return self.begun[key]
+
     def _search(self, goal: FloatArray) -> Iterator[FloatArray]:
         """Ways to a goal without end, as long as there are any."""
         start = self.start
         if not (start != goal).any():
             yield start[None]
             return
-        cells, narrow = self._cells(np.stack([start, goal])), list[FloatArray]()
-        cells.avoided = self.stuck
-        while (route := cells.cheapest(start, goal)) is not None:
+        narrow = list[FloatArray]()
+        cells, route = self._begun(goal)
+        while route is not None:
             route = resampled(shortened(self.room, route), self.spacing)
             route = pulled(self.room, route)
             yield refined(self.room, resampled(route, self.spacing))
             narrow.append(self.room.narrowest(route))
             cells.avoided = [*narrow, *self.stuck]
+            route = cells.cheapest(start, goal)
 
     def avoid(self, place: FloatArray) -> None:
         """Have ways that are looked for from now on avoid a place, shape (3,); [m]."""
