@@ -179,12 +179,14 @@ def least_changed(
     tip, joint = node // n_links, node % n_links
     required = problem.required_clearance - TOLERANCES.bracket_gap
     free = np.zeros(len(tips), dtype=np.bool_)
-    free[tip[clearance(ends).min(axis=1) >= required]] = True
-    doubtful = np.flatnonzero(~free[tip])
+    clearances = clearance(ends)
+    free[tip[clearances.min(axis=1) >= required]] = True
+    doubtful = ~free[tip]
     for part in (0, 1):
-        segments = ends[doubtful, part : part + 2]
+        near = np.flatnonzero(doubtful & (clearances[:, part] < required))
+        segments = ends[near, part : part + 2]
         upper = upper_clearance(problem, segments).min(axis=1, initial=np.inf)
-        upper = upper + slack.body[tip[doubtful], joint[doubtful]]
-        doubtful = doubtful[~(upper < required)]
+        upper = upper + slack.body[tip[near], joint[near]]
+        doubtful[near] = ~(upper < required)
     free[tip[doubtful]] = True
     return np.asarray(np.where(free | (least == 0), least, 2))

@@ -75,7 +75,8 @@ def hemmed_in(
         proved[tip[likely[open_]]] = False
         proved[np.bincount(tip, minlength=len(tips)) > MOST] = False
         rest = np.flatnonzero(proved[tip])
-        rest = rest[~_shut(problem, links[rest], _turned(cells[rest]))]
+        shut = _shut(problem, clearance, links[rest], _turned(cells[rest]))
+        rest = rest[~shut]
         if not rest.size:
             return proved
         tip, cells = np.repeat(tip[rest], 2), _halved(cells[rest])
@@ -154,7 +155,12 @@ def _turned(cells: FloatArray) -> FloatArray:
     return np.asarray((lean + widest * turn) / 2.0)
 
 
-def _shut(problem: PlanningProblem, links: FloatArray, turned: FloatArray) -> BoolArray:
+def _shut(
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    links: FloatArray,
+    turned: FloatArray,
+) -> BoolArray:
     """Whether links stay too close to some obstacle however they turn so far."""
     shut = np.zeros(len(links), dtype=np.bool_)
     need = problem.required_clearance - TOLERANCES.bracket_gap - problem.tip_tolerance
@@ -163,6 +169,8 @@ def _shut(problem: PlanningProblem, links: FloatArray, turned: FloatArray) -> Bo
         ends = links[left]
         ends[:, 1] = ends[:, 0] + part * (ends[:, 1] - ends[:, 0])
         moved = part * problem.manipulator.link_lengths[-1] * turned[left]
+        near = clearance(ends)[:, 0] + moved < need
+        left, ends, moved = left[near], ends[near], moved[near]
         clearances = upper_clearance(problem, ends).min(axis=1, initial=np.inf)
         shut[left] = clearances + moved < need
     return shut
