@@ -2,13 +2,13 @@
 
 A proved distance to a mesh takes a bracket for every triangle that is near. A planner
 asks far too often for that, and needs no proof: here a segment is held against each
-triangle in plain arithmetic, and balls round ever smaller groups of triangles spare
-most of them.
+triangle in plain arithmetic. Balls round ever smaller groups of triangles, and slabs
+that hold them between two planes, spare most of them.
 """
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -30,26 +30,50 @@ CROWD: Final = 4
 """At most so many triangles are looked at one by one."""
 
 
+class Triangles(NamedTuple):
+    """Triangles of surfaces."""
+
+    corners: FloatArray
+    """Shape (t, 3, 3); [m]."""
+
+    planes: FloatArray
+    """Their unit normals and offsets, 0 where rounding decides, shape (t, 4)."""
+
+    edges: BoolArray
+    """Which edges, each from one corner to the next, no triangle before has, shape
+    (t, 3)."""
+
+
+class Groups(NamedTuple):
+    """Ever smaller groups of triangles.
+
+    Group 1 has all of them, and groups 2 k and 2 k + 1 have the halves of group k.
+    """
+
+    first: IntArray
+    """Where the triangles of each begin, and where they end, shape (b, 2)."""
+
+    balls: FloatArray
+    """Centres and radii of balls that hold them, shape (b, 4); [m]."""
+
+    slabs: FloatArray
+    """Unit normals of planes, and the two offsets between which they lie, shape
+    (b, 5)."""
+
+
 @dataclass(frozen=True)
 class Surfaces:
-    """Triangles of surfaces, and balls round ever smaller groups of them.
-
-    Ball 1 holds all triangles, and balls 2 k and 2 k + 1 hold the halves of those of
-    ball k.
+    """What a segment is held against.
 
     Args:
-        corners: Shape (t, 3, 3); [m].
-        planes: Their unit normals and offsets, 0 where rounding decides, shape (t, 4).
-        first: Where the triangles of each ball begin, and where they end, shape (b, 2).
-        balls: Centres and radii, shape (b, 4); [m].
+        triangles: Of all surfaces.
+        groups: Of these.
         solids: The meshes that have an inside.
         covers: What `encloses` asks of their pieces.
     """
 
-    corners: FloatArray
-    planes: FloatArray
-    first: IntArray
-    balls: FloatArray
+    triangles: Triangles
+    groups: Groups
     solids: PackedPieces
     covers: IntArray
 
@@ -74,13 +98,12 @@ class Surfaces:
         Raises:
             OutOfTime: If the time is over.
         """
-        if not len(self.corners):
+        if not len(self.triangles.corners):
             return np.full(len(ends), np.inf)
         reach = enough + STEP
         bound = nearest_triangles(
-            (self.corners, self.planes),
-            self.first,
-            self.balls,
+            self.triangles,
+            self.groups,
             ends,
             floor,
             reach,
@@ -100,8 +123,22 @@ def surfaces_of(obstacles: tuple[Obstacle, ...]) -> Surfaces:
     corners = corners[coherent_order(corners.mean(axis=1))]
     solid = [mesh for mesh in meshes if mesh.has_inside]
     pieces = pack_pieces([mesh.pieces for mesh in solid])
-    balls = _balls(corners)
-    return Surfaces(corners, _planes(corners), *balls, pieces, covers_of(solid, pieces))
+    triangles = Triangles(corners, _planes(corners), _new_edges(corners))
+    return Surfaces(triangles, _groups(corners), pieces, covers_of(solid, pieces))
+
+
+def _new_edges(corners: FloatArray) -> BoolArray:
+    """Edges as `Triangles` has them, shape (t, 3)."""
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+    # Both triangles of an edge have its ends in another order.
+    differ = ends[:, 0] != ends[:, 1]
+    rows, axis = np.arange(len(ends)), differ.argmax(axis=1)
+    turned = ends[rows, 0, axis] > ends[rows, 1, axis]
+    ends[turned] = ends[turned, ::-1]
+    _, number = np.unique(ends.reshape(-1, 6), axis=0, return_index=True)
+    new = np.zeros(len(ends), dtype=np.bool_)
+    new[number] = True
+    return new.reshape(-1, 3)
 
 
 def _planes(corners: FloatArray) -> FloatArray:
@@ -118,47 +155,61 @@ def _planes(corners: FloatArray) -> FloatArray:
     return planes
 
 
-def _balls(corners: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Triangles and balls as `Surfaces` has them, shape (b, 2) and (b, 4); [m]."""
+def _groups(corners: FloatArray) -> Groups:
+    """Groups of triangles, shape (t, 3, 3); [m]."""
+    sides = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(sides[:, 0], sides[:, 1])
     ranges, balls = [np.zeros((1, 2), np.int64)], [np.zeros((1, 4))]
-    count = 1
+    slabs, count = [np.zeros((1, 5))], 1
     while len(corners):
         marks = np.arange(count + 1) * len(corners) // count
-        sizes = np.diff(marks)
-        low = np.minimum.reduceat(corners.min(axis=1), marks[:-1])
-        high = np.maximum.reduceat(corners.max(axis=1), marks[:-1])
+        sizes, at = np.diff(marks), marks[:-1]
+        low = np.minimum.reduceat(corners.min(axis=1), at)
+        high = np.maximum.reduceat(corners.max(axis=1), at)
         centre = (low + high) / 2.0
-        off = np.linalg.norm(
-            corners - np.repeat(centre, sizes, axis=0)[:, None], axis=2
-        )
-        radius = np.maximum.reduceat(off.max(axis=1), marks[:-1])
-        ranges.append(np.column_stack([marks[:-1], marks[1:]]))
+        off = corners - np.repeat(centre, sizes, axis=0)[:, None]
+        radius = np.maximum.reduceat(np.linalg.norm(off, axis=2).max(axis=1), at)
+        normal = np.add.reduceat(normals, at)
+        size = np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = np.where(size > 0.0, normal / np.where(size > 0.0, size, 1.0), 0.0)
+        height = (corners * np.repeat(normal, sizes, axis=0)[:, None]).sum(axis=2)
+        least = np.minimum.reduceat(height.min(axis=1), at)
+        most = np.maximum.reduceat(height.max(axis=1), at)
+        ranges.append(np.column_stack([at, marks[1:]]))
         balls.append(np.column_stack([centre, radius]))
+        slabs.append(np.column_stack([normal, least, most]))
         if sizes.max() <= CROWD:
             break
         count *= 2
-    return np.concatenate(ranges), np.concatenate(balls)
+    return Groups(np.concatenate(ranges), np.concatenate(balls), np.concatenate(slabs))
 
 
 @compiled
-def _from_ball(ball: FloatArray, a: FloatArray, b: FloatArray) -> float:
-    """Distance of a segment from a ball, negative within it; [m]."""
-    along = span = 0.0
+def _from_group(
+    ball: FloatArray, slab: FloatArray, a: FloatArray, b: FloatArray
+) -> float:
+    """Lower bound of the distance of a segment from a group of triangles; [m]."""
+    along = span = above = below = 0.0
     for c in range(3):
         d = b[c] - a[c]
         along += (ball[c] - a[c]) * d
         span += d * d
+        above += slab[c] * a[c]
+        below += slab[c] * b[c]
     t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
     square = 0.0
     for c in range(3):
         gap = ball[c] - a[c] - t * (b[c] - a[c])
         square += gap * gap
-    return float(sqrt(square) - ball[3])
+    beside = max(min(above, below) - slab[4], slab[3] - max(above, below))
+    return float(max(sqrt(square) - ball[3], beside))
 
 
 @compiled
-def _from_edges(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
-    """Squared distance of a segment from the edges of a triangle; [m^2].
+def _from_edges(
+    corners: FloatArray, edges: BoolArray, a: FloatArray, b: FloatArray
+) -> float:
+    """Squared distance of a segment from edges of a triangle; [m^2].
 
     Of each edge the place nearest to the segment's line, moved to an end where it must
     be, and the place on the segment nearest to that: never less than the distance.
@@ -166,6 +217,8 @@ def _from_edges(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     uu, square = ux * ux + uy * uy + uz * uz, np.inf
     for k in range(3):
+        if not edges[k]:
+            continue
         p, q = corners[k], corners[(k + 1) % 3]
         vx, vy, vz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
         wx, wy, wz = a[0] - p[0], a[1] - p[1], a[2] - p[2]
@@ -200,42 +253,38 @@ def _over(
 
 @compiled
 def _of_leaf(
-    triangles: tuple[FloatArray, FloatArray],
-    between: IntArray,
-    a: FloatArray,
-    b: FloatArray,
-    best: float,
+    triangles: Triangles, between: IntArray, a: FloatArray, b: FloatArray, best: float
 ) -> float:
-    """Distance of a segment to the triangles of a ball, at most `best`; [m].
+    """Distance of a segment to some triangles in a row, at most `best`; [m].
 
     Nearest are an edge and the segment, or one of its ends and the triangle's inside,
-    or the segment passes through it.
+    or the segment passes through it. An edge of two triangles is left to one of them.
     """
-    corners, planes = triangles
+    corners, planes, edges = triangles.corners, triangles.planes, triangles.edges
     for k in range(between[0], between[1]):
         nx, ny, nz, offset = planes[k]
         above = nx * a[0] + ny * a[1] + nz * a[2] - offset
         below = nx * b[0] + ny * b[1] + nz * b[2] - offset
         if max(min(above, below), min(-above, -below)) >= best:
             continue
-        square = _from_edges(corners[k], a, b)
+        square = _from_edges(corners[k], edges[k], a, b)
         if nx != 0.0 or ny != 0.0 or nz != 0.0:
             t = above / (above - below) if above * below < 0.0 else 0.0
             if t > 0.0 and _over(corners[k], planes[k], a, b, t):
                 return 0.0
-            if above * above < square and _over(corners[k], planes[k], a, b, 0.0):
+            most = min(square, best * best)
+            if above * above < most and _over(corners[k], planes[k], a, b, 0.0):
                 square = above * above
-            if below * below < square and _over(corners[k], planes[k], a, b, 1.0):
-                square = below * below
+            if below * below < most and _over(corners[k], planes[k], a, b, 1.0):
+                square = min(square, below * below)
         best = min(best, sqrt(square))
     return best
 
 
 @compiled
 def nearest_triangles(
-    triangles: tuple[FloatArray, FloatArray],
-    first: IntArray,
-    balls: FloatArray,
+    triangles: Triangles,
+    groups: Groups,
     ends: FloatArray,
     floor: float,
     enough: float,
@@ -247,9 +296,8 @@ def nearest_triangles(
     ends at the first that is nearer than `floor`.
 
     Args:
-        triangles: Their corners and planes, see `Surfaces`.
-        first: See `Surfaces`.
-        balls: See `Surfaces`.
+        triangles: The triangles.
+        groups: Of these.
         ends: Shape (n, 2, 3); [m].
         floor: The least distance that matters; [m].
         enough: The largest distance that matters; [m].
@@ -258,7 +306,8 @@ def nearest_triangles(
     Returns:
         Shape (n,), 0 where the time was over; [m].
     """
-    triangles, balls, ends = borrowed(triangles), borrowed(balls), borrowed(ends)
+    triangles, groups, ends = borrowed(triangles), borrowed(groups), borrowed(ends)
+    first, balls, slabs = groups.first, groups.balls, groups.slabs
     result = np.zeros(ends.shape[0])
     stack, gaps = np.zeros(STACK, np.int64), np.zeros(STACK)
     nearest = balls.shape[0] - 1
@@ -272,21 +321,23 @@ def nearest_triangles(
         stack[0], gaps[0], waiting = 1, -np.inf, int(nearest > 0)
         while waiting > 0 and best >= floor and best > 0.0:
             waiting -= 1
-            ball = stack[waiting]
+            group = stack[waiting]
             if gaps[waiting] >= best:
                 continue
-            if 2 * ball >= balls.shape[0]:
-                closer = _of_leaf(triangles, first[ball], a, b, best)
+            if 2 * group >= balls.shape[0]:
+                closer = _of_leaf(triangles, first[group], a, b, best)
                 if closer < best:
-                    best, nearest = closer, ball
+                    best, nearest = closer, group
                 continue
-            near, far = 2 * ball, 2 * ball + 1
-            gap, other = _from_ball(balls[near], a, b), _from_ball(balls[far], a, b)
+            near, far = 2 * group, 2 * group + 1
+            gap = _from_group(balls[near], slabs[near], a, b)
+            other = _from_group(balls[far], slabs[far], a, b)
             if gap > other:
                 near, far, gap, other = far, near, other, gap
-            stack[waiting], gaps[waiting] = far, other
-            stack[waiting + 1], gaps[waiting + 1] = near, gap
-            waiting += 2
+            for one, least in ((far, other), (near, gap)):
+                if least < best:
+                    stack[waiting], gaps[waiting] = one, least
+                    waiting += 1
         result[n] = best
     return result
 
