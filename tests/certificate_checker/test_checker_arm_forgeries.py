@@ -18,11 +18,20 @@ from oracles.arm_certificates import ERRORS, HELPER, MATE, OBSTACLES, MadeArm
 from oracles.certificate_cases import write_cube
 from oracles.certificate_mutations import numbers_in, place
 
+from vdsm_pin.certificate_checker.solids import Mesh
+
+TURNED = {
+    "obstacles": [
+        {"name": "helper: foot", "shift": 1, "turn_deg": 2},
+    ]
+}
+"""Errors of a link of another robot."""
+
 SCENES: dict[str, dict[str, Any]] = {
     "bodies": {"obstacles": OBSTACLES[1:]},
     "moving": {"obstacles": OBSTACLES},
     "errors": {"obstacles": OBSTACLES[1:], "errors": ERRORS},
-    "others": {"obstacles": OBSTACLES[:2], "others": [MATE, HELPER]},
+    "others": {"obstacles": OBSTACLES[:2], "others": [MATE, HELPER], "errors": TURNED},
 }
 
 
@@ -89,6 +98,24 @@ def test_what_is_inside_of_a_mesh_is_refused(what: str, tmp_path: Path) -> None:
     lines = made.certified()
     made.data["obstacles"][0]["solid"] = True
     assert "not proved outside shell" in made.check(lines).reason
+
+
+def test_points_are_outside_farther_than_gaps_by_what_is_thinnest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """O_1 by the thinnest part of the arm, what is carried by what is required."""
+    shell = {"name": "shell", "shape": "mesh", "file": "shell.stl", "solid": False}
+    shell |= {"check_size": False}
+    write_cube(tmp_path / "shell.stl", 3000.0)
+    made, asked = MadeArm(tmp_path, obstacles=[shell]), []
+    lines = made.certified()
+
+    def check_outside(_: Mesh, __: Any, points: Any) -> None:
+        asked.extend([off for _, _, off in points])
+
+    monkeypatch.setattr(Mesh, "check_outside", check_outside)
+    assert made.check(lines).accepted
+    assert asked == [0.012, 0.005, 0.005, 0.005]  # tool, camera, valve in two parts
 
 
 NOT_TIGHT = {
@@ -173,6 +200,10 @@ def row_of(name: str, row: int, by: float) -> Change:
     return change
 
 
+def untimed(made: MadeArm) -> None:
+    made.motions["t.csv"] = replace(made.motions["t.csv"], times=None)
+
+
 def later(made: MadeArm) -> None:
     mate = made.motions["mate.csv"]
     assert mate.times is not None
@@ -198,6 +229,7 @@ FILES: dict[str, tuple[Change, str]] = {
     "mate elsewhere": (row_of("mate.csv", 1, 1e-5), "claims"),
     "mate there": (row_of("mate.csv", 1, -1e-5), "claims"),
     "mate later": (later, "claims"),
+    "rows without times": (untimed, "rows beside what moves have no times"),
     "another mate": (at(OTHERS, 0, name="twin"), "of each of"),
     "no mate": (without(OTHERS, 0), "of each of"),
     "mate without tool": (without(OTHERS, 0, ARM, "tool"), "of each of"),
@@ -287,7 +319,7 @@ STATED: dict[str, tuple[Callable[[Any], Any], str]] = {
 
 def test_forged_headers_are_refused(tmp_path: Path) -> None:
     """Bodies in parts, errors of each joint and obstacle, links of another robot."""
-    made = MadeArm(tmp_path, **(SCENES["errors"] | SCENES["others"]))
+    made = MadeArm(tmp_path, **(SCENES["others"] | {"errors": ERRORS}))
     made.most = 1e-3  # the verifier counts more of errors beside what moves
     made.data["obstacles"] = [OBSTACLES[1], OBSTACLES[3]]
     lines = made.certified()

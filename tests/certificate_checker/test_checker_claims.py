@@ -3,6 +3,7 @@
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +11,10 @@ from flint import arb
 from oracles.certificate_cases import SHAPES, random_case
 from oracles.certificate_oracle import sealed
 
-from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_checker import check_certificate, claims
 from vdsm_pin.certificate_checker.arm import Arm
 from vdsm_pin.certificate_checker.balls import UP, Rejected
-from vdsm_pin.certificate_checker.claims import Plane, clearances
+from vdsm_pin.certificate_checker.claims import Plane, clearances, tiled
 from vdsm_pin.certificate_checker.motion import Interval, Slices
 from vdsm_pin.certificate_checker.solids import Body, Pair, Solid
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
@@ -122,3 +123,66 @@ def test_a_certificate_without_an_interval_is_refused(tmp_path: Path) -> None:
         outcome = check_certificate(case.certificate, case.problem, case.trajectory)
         assert f"interval {kept - 1} is missing" in outcome.reason
         assert outcome.n_intervals == kept - 1
+
+
+def test_as_much_as_is_proved_may_be_claimed_to_the_last_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case, proved = random_case(np.random.default_rng(4), tmp_path, ["box"]), {}
+    kept = claims.clearances
+
+    def seen(pair: Pair, planes: list[Plane], slices: Slices) -> Any:
+        found = kept(pair, planes, slices)
+        for plane, most in zip(planes, found.tolist(), strict=True):
+            proved[plane.place, plane.slice[1], plane.first] = most
+        return found
+
+    monkeypatch.setattr(claims, "clearances", seen)
+    files = case.certificate, case.problem, case.trajectory
+    assert check_certificate(*files).accepted
+    every = []
+    for line in case.lines[1:]:
+        for pair, proof in zip(case.lines[0]["pairs"], line["proofs"], strict=True):
+            place = f"interval {line['k']}, {' and '.join(pair)}"
+            every += [((place, a, p[0]), p) for a, _, planes in proof for p in planes]
+    for key, plane in every:
+        plane[-1] = proved[key]
+    case.certificate.write_bytes(sealed(case.lines))
+    assert check_certificate(*files).accepted
+    for key, plane in every[:: len(every) // 3]:
+        plane[-1] = float(np.nextafter(proved[key], np.inf))
+        case.certificate.write_bytes(sealed(case.lines))
+        assert "claims" in check_certificate(*files).reason
+        plane[-1] = proved[key]
+
+
+@pytest.mark.parametrize(
+    ("ranges", "reason"),
+    [
+        ([(0, 5), (5, 12)], ""),
+        ([(0, 0), (0, 12)], "the pieces do not tile at 0 of 12"),
+        ([(0, 5), (5, 5), (5, 12)], "the pieces do not tile at 5 of 12"),
+        ([(0, 5), (4, 12)], "the pieces do not tile at 5 of 12"),
+        ([(0, 5), (6, 12)], "the pieces do not tile at 5 of 12"),
+        ([(0, 13)], "the pieces do not tile at 0 of 12"),
+        ([(0, 11)], "the pieces end at 11 of 12"),
+        ([], "the pieces end at 0 of 12"),
+    ],
+)
+def test_pieces_are_tiled(ranges: list[tuple[int, int]], reason: str) -> None:
+    """And a body is told to be held off some pieces where there are two ranges."""
+    interval = Interval(Tree([]), [])
+    rest = Solid("rest", np.zeros((12, 3, 3)))
+    pair = Pair(Body(0, Solid("body", [[[0.0, 0.0, 0.0]]])), rest, 0, 0.0, 0.0)
+    proof = [[0.0, 1.0, [[*both, 0, 0, 1, 0.5] for both in ranges]]]
+    if reason:
+        with pytest.raises(Rejected, match=reason):
+            [*tiled(pair, proof, "", interval)]
+    else:
+        planes = [*tiled(pair, proof, "", interval)]
+        assert [(one.first, one.last) for one in planes] == ranges
+        assert rest.split == {pair.body.solid}
+        one = [[0.0, 1.0, [[0, 12, 0, 0, 1, 0.5]]]]
+        whole = Solid("whole", np.zeros((12, 3, 3)))
+        assert [*tiled(pair._replace(solid=whole), one, "", interval)]
+        assert not whole.split

@@ -37,7 +37,8 @@ def reached(
     tree = Tree([joint])
     interval = Interval(tree, [[arb(0), arb(width / share)]])
     slices = Slices(tree, [(interval, 0.0, share)])
-    point = Solid("point", [[[LEVER, 0.0, 0.0]]], disc=((1.0, 0.0, 0.0), disc))
+    ends = [[[LEVER, 0.0, 0.0], [LEVER / 2.0, 0.0, 0.0]]]
+    point = Solid("point", ends, disc=((1.0, 0.0, 0.0), disc))
     body, at = Body(1, point), np.zeros(1, np.int64)
     found, size = slices.reach(body, 0, at, np.array([[0.0, 1.0, 0.0]]))
     return found.item(), size.item()

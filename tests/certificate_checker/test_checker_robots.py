@@ -133,24 +133,26 @@ def test_motions_of_few_rows_are_accepted_and_held_to_their_rates(
     assert rows == 1 or "the limit of its rates" in outcome.reason
 
 
-def timed(folder: Path, smooth: int) -> Made:
-    """Rows at moments that do not begin at 0, of which the last way is the fastest."""
+def timed(folder: Path, smooth: int, middle: float = 7.0) -> Made:
+    """Rows at moments that do not begin at 0; of two ways the shorter is the faster."""
     made = Made(folder, "fixed", smooth)
     rows = np.array([[0, 0.01, 0], [0.1, 0.1, 0.1], [0.2, 0.2, 0.1]])
+    rows[1, 1] = 0.11 if middle < 6.0 else 0.1
     rest = np.zeros((3, 3 * smooth))
-    times = np.array([[5.0], [7.0], [7.5]])
+    times = np.array([[5.0], [middle], [7.5]])
     if not smooth:
         made.rows[0].append("time_s")
     made.rows[1:] = np.hstack([rows, times, rest]).tolist()
     return made
 
 
+@pytest.mark.parametrize("middle", [5.5, 7.0])
 @pytest.mark.parametrize(("smooth", "peak"), [(0, 0.2), (1, 0.3), (2, 0.375)])
 def test_rates_are_per_second_wherever_the_clock_begins(
-    tmp_path: Path, smooth: int, peak: float
+    tmp_path: Path, smooth: int, peak: float, middle: float
 ) -> None:
     """0.1 m in 0.5 s: evenly, or by a piece that is 3/2 or 15/8 as fast inside."""
-    made = timed(tmp_path, smooth)
+    made = timed(tmp_path, smooth, middle)
     lines, urdf = made.certified(), made.texts["all.urdf"]
     for share, good in ((1.0 + 1e-8, True), (1.0 - 1e-8, False)):
         made.texts["all.urdf"] = urdf
@@ -158,6 +160,20 @@ def test_rates_are_per_second_wherever_the_clock_begins(
         outcome = made.check(copy.deepcopy(lines))
         assert outcome.accepted is good
         assert good or "the limit of its rates" in outcome.reason
+
+
+@pytest.mark.parametrize(("end", "sense"), [(-0.1, -1.0), (0.4, 1.0)])
+def test_a_joint_may_stand_at_its_limit(
+    tmp_path: Path, end: float, sense: float
+) -> None:
+    made = Made(tmp_path)
+    for off, good in ((0.0, True), (1e-9, False)):
+        files = RobotFiles(made.folder / "all.urdf", lock={"lift": end + sense * off})
+        if good:
+            assert Model(files, np.eye(4)).values["lift"] == (None, 1.0, end)
+        else:
+            with pytest.raises(Rejected, match="'lift' stands outside of its limits"):
+                Model(files, np.eye(4))
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,8 @@ def made(
     """A GLB of one node, by hand."""
     kinds = dict(zip("bBhHIf", (5120, 5121, 5122, 5123, 5125, 5126), strict=True))
     kind = "f" if positions.dtype == np.float32 else positions.dtype.char
-    data = positions.tobytes() + b"\0" * (-positions.nbytes % 4)
+    skipped = node.pop("skipped", 0)
+    data = b"head" + positions.tobytes() + b"\0" * (-positions.nbytes % 4)
     order = np.array(faces, indices)
     normalized = node.pop("normalized", False)
     stride = positions.itemsize * 3
@@ -47,14 +48,16 @@ def made(
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
         "buffers": [{"byteLength": len(data) + order.nbytes}],
         "bufferViews": [
-            {"buffer": 0, "byteLength": positions.nbytes, "byteStride": stride},
+            {"buffer": 0, "byteOffset": 4, "byteLength": positions.nbytes}
+            | {"byteStride": stride},
             {"buffer": 0, "byteOffset": len(data), "byteLength": order.nbytes},
         ],
         "accessors": [
             {
                 "bufferView": 0,
                 "componentType": kinds[kind],
-                "count": len(positions),
+                "byteOffset": stride * skipped,
+                "count": len(positions) - skipped,
                 "type": "VEC3",
                 "normalized": normalized,
             },
@@ -76,6 +79,12 @@ def made(
 
 
 CORNERS = np.array([[1, 2, 3], [4, -5, 6], [-7, 8, 9]], np.float32)
+
+
+def test_an_accessor_begins_so_far_behind_its_view(tmp_path: Path) -> None:
+    more = np.concatenate([np.zeros((2, 3), np.float32), CORNERS])
+    (found,) = triangles_of(made(more, [0, 1, 2], skipped=2), tmp_path)
+    np.testing.assert_array_equal(found, CORNERS)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -156,6 +165,11 @@ def test_whole_numbers_of_glb_are_shares_where_they_are_said_to_be(
         content = made(shorts, [0, 1, 2], normalized=normalized)
         (found,) = triangles_of(content, tmp_path)
         np.testing.assert_allclose(found, expected, rtol=1e-15)
+    for kind in (np.int8, np.uint8, np.int16, np.uint16):
+        low, high = np.iinfo(kind).min, np.iinfo(kind).max
+        whole = np.array([[high, 0, 51], [low, 2, 3], [9, 8, 7]], kind)
+        (found,) = triangles_of(made(whole, [0, 1, 2]), tmp_path)
+        np.testing.assert_array_equal(found, whole)
     bytes_ = np.array([[255, 0, 51], [1, 2, 3], [9, 8, 7]], np.uint8)
     (found,) = triangles_of(made(bytes_, [0, 1, 2], normalized=True), tmp_path)
     np.testing.assert_allclose(found, bytes_ / 255.0, rtol=1e-15)
@@ -225,6 +239,13 @@ def test_a_dae_is_as_large_as_it_may_be(
     monkeypatch.setattr(dae_format, "MAX_BYTES", file.stat().st_size - 1)
     with pytest.raises(InvalidFile, match="is larger than"):
         read_mesh(file)
+
+
+@pytest.mark.parametrize("far", [1 << 40, -(1 << 40), 1 << 70])
+def test_corners_of_dae_are_no_huge_numbers(tmp_path: Path, far: int) -> None:
+    root = f'<triangles count="1">{INPUT}<p>0 1 {far}</p></triangles>'
+    with pytest.raises(InvalidFile, match="where numbers are meant"):
+        read_mesh(write(tmp_path, "a.dae", dae(HERE, root=root)))
 
 
 def test_a_note_of_dae_counts_the_parts_that_have_it(tmp_path: Path) -> None:

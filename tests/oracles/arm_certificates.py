@@ -54,7 +54,9 @@ HELPER: dict[str, Any] = {
 }
 URDF = """<robot name="helper">
   <link name="foot"><collision><origin xyz="0 0 0.1"/>
-    <geometry><box size="0.2 0.1 0.2"/></geometry></collision></link>
+    <geometry><box size="0.2 0.1 0.2"/></geometry></collision>
+    <collision><origin xyz="0 0.1 0.1" rpy="0.1 0.4 0"/>
+    <geometry><cylinder radius="0.08" length="0.1"/></geometry></collision></link>
   <link name="hand"><collision><origin xyz="0.3 0 0" rpy="0.3 0 0.1"/>
     <geometry><mesh filename="hand.stl" scale="0.01 0.02 0.01"/></geometry>
     </collision></link>
