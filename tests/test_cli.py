@@ -23,6 +23,7 @@ from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 from vdsm_pin.batch.run import Batch, run_batch
 from vdsm_pin.batch.task import Settings
 from vdsm_pin.cli import app, main
+from vdsm_pin.cli.ending import fail
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
@@ -758,3 +759,15 @@ def test_a_shell_can_be_taught_to_complete(
         monkeypatch.setenv("COMP_WORDS", words)
         monkeypatch.setenv("COMP_CWORD", str(words.count(" ")))
         assert vdsm().out.split() == found
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_parts_of_an_error_stand_on_lines_of_a_terminal(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    with pytest.raises(SystemExit, match="1"):
+        fail(NoPlanFound("no plan found; the path is long"), 1)
+    between = "\n  " if terminal else "; "
+    told = f"vdsm: no plan found{between}the path is long\n"
+    assert capsys.readouterr().err == told

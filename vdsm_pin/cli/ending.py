@@ -16,10 +16,11 @@ PIPE_CLOSED: Final = 141
 
 
 def fail(error: Exception, status: int) -> NoReturn:
-    """Say what went wrong, and end."""
+    """Say what went wrong, each part on a line of its own on a terminal, and end."""
     with suppress(OSError):  # of a disk that is full, say; the status still tells
+        between = "\n  " if sys.stderr.isatty() else "; "
         for one in (error, *getattr(error, "others", ())):
-            typer.echo(printable(f"vdsm: {one}"), err=True)
+            typer.echo(printable(f"vdsm: {one}").replace("; ", between), err=True)
     sys.exit(status)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,16 +38,12 @@ from vdsm_pin.verification.records import (
     ClosestApproach,
     Counterexample,
     Pair,
-    Verdict,
     Verification,
 )
 from vdsm_pin.verification.task import ArmPairs
 
 if TYPE_CHECKING:  # whoever verifies needs no planner
     from vdsm_pin.refinement import Refinement
-
-_CHUNK: Final = 65_536  # rows treated at once, so that memory stays bounded
-_PASSED: Final = Verdict.CERTIFIED
 
 
 def in_file_frame(verification: Verification, point: FloatArray) -> Point | None:
