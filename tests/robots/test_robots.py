@@ -12,6 +12,7 @@ from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.geometry.solids import Cylinder, HalfSpace, Sphere
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
 from vdsm_pin.robots.cell import Cell, cell_of, read_cell
@@ -205,6 +206,11 @@ def test_of_bodies_that_meet_the_depth_is_told_as_the_least(
     assert -0.05 <= row.worst < -0.005  # they share a slab of 50 mm
     near = next(one for one in found.approaches if str(one.pair) == "base and crate")
     assert (near.upper, near.deeper) == (row.worst, True)
+    # The arm's ball of 100 mm comes 80 mm deep into a wall; what both hold is smaller.
+    wall = HalfSpace("wall", np.array([0.0, 1.02, 0.0]), np.array([0.0, -1.0, 0.0]))
+    deep = verify_robot(Cell(robot, Scene((wall,))), rows)
+    near = next(one for one in deep.approaches if str(one.pair) == "arm and wall")
+    assert -0.08 - 1e-9 <= near.upper <= 0.9 * -0.08
     ball = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
     apart = verify_robot(Cell(robot, ball, required_clearance=0.151), rows)
     assert apart.verdict is Verdict.REFUTED

@@ -64,7 +64,7 @@ def _met(
     enough: float,
     span: FloatArray,
 ) -> LeastClearances:
-    """The same, with the balls in both bodies that are found."""
+    """The same, with the balls in both bodies that are deeper than what is proved."""
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
     changed = dict[int, tuple[Any, ...]]()
     beside = min(1.0, span[1] - span[0]) * BESIDE
@@ -77,7 +77,7 @@ def _met(
         for at, pose in enumerate(poses):
             bodies = cell.placed(pairs[k], pose)
             radius, centre = common_ball(*bodies, middle, enough)
-            if radius > 0.0:
+            if radius > max(0.0, -float(least.upper[k])):
                 when = intervals[at], shares[at], least.lower[k]
                 changed[k] = *when, -radius, REFUTED, centre, centre
                 break
