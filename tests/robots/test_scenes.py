@@ -269,5 +269,5 @@ def test_whole_numbers_of_any_size_are_refused(tmp_path: Path) -> None:
         f"world: {{collision_objects: [{{id: a, pose: {{position: [0, 0, {10**400}]}}"
     )
     text += ", primitives: [], primitive_poses: []}]}"
-    with pytest.raises(InvalidFile, match="expected 3 numbers"):
+    with pytest.raises(InvalidFile, match="expected 3 finite numbers"):
         read_scene(write(tmp_path, "m.yaml", text), 1.0)

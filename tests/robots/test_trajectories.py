@@ -11,10 +11,11 @@ import pytest
 
 from tests.robots.test_robots import CELL, SCENE, URDF, mutated, write
 from vdsm_pin.cli import main
-from vdsm_pin.errors import InvalidFile, VdsmError
+from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io import bags
 from vdsm_pin.io.bags import read_bag, write_bag
+from vdsm_pin.io.places import Place
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.io.trajectory_messages import of_message, text_of
@@ -110,6 +111,45 @@ def test_topics_are_chosen(tmp_path: Path, robot: Robot) -> None:
             read_bag(file)
 
 
+def test_bags_without_trajectories_are_told(tmp_path: Path) -> None:
+    """No topic of one, and a topic without a message: there is none to choose."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    types = pytest.importorskip("rosbags.typesys")
+    store = types.get_typestore(types.Stores.ROS2_HUMBLE)
+    for kind, said in (
+        ("std_msgs/msg/String", "bag: has no topic of trajectories$"),
+        (bags.PLANS[0], "bag: topic /a has no message$"),
+        (bags.STATES, "bag: topic /a has no message$"),
+    ):
+        bag = tmp_path / kind.replace("/", "_") / "bag"
+        bag.parent.mkdir()
+        with rosbag2.Writer(bag, version=9) as writer:
+            writer.add_connection("/a", kind, typestore=store)
+        with pytest.raises(InvalidFile, match=said):
+            read_bag(bag)
+
+
+@pytest.mark.parametrize("ending", [".json", ".yaml"])
+def test_what_is_wrong_with_messages_is_said(
+    tmp_path: Path, robot: Robot, ending: str
+) -> None:
+    good = json.loads(text_of(motion(0), ".json"))
+    display = {"trajectory": [{"joint_trajectory": good}] * 2}
+    turned = {"positions": [90.0, 0.0]}
+    for data, said in (
+        (display, r"trajectory .*: has 2 trajectories, expected one$"),
+        ({"trajectory": []}, r"trajectory .*: has 0 trajectories, expected one$"),
+        (good | {"points": [turned]}, "is it in degrees. expected radians$"),
+        (good | {"points": [[0, 0]]}, r"points\[0\] .*: has no positions$"),
+        (good | {"points": {}}, "is no JointTrajectory"),
+        (good | {"joint_names": ["turn", 1]}, "joint_names .*'1', expected names"),
+        ([good], "is no trajectory: expected joint_names and points$"),
+    ):
+        file = write(tmp_path, f"t{ending}", json.dumps(data, indent=1))
+        with pytest.raises(InvalidFile, match=said):
+            read_motion(file, robot.joints)
+
+
 @pytest.mark.parametrize(
     ("names", "q"), [(["a", "b"], 3), (["a", "b"], 1), (["a"], 1), (["a", "b", "c"], 3)]
 )
@@ -121,11 +161,11 @@ def test_no_position_of_a_state_is_left_out(names: list[str], q: int) -> None:
         header = SimpleNamespace(stamp=stamp)
         return SimpleNamespace(header=header, name=names, position=np.arange(q) + 0.5)
 
-    file, good = Path("t.bag"), [state(["a", "b"], 2), state(["b", "a"], 2)]
-    points = bags._states(file, good)["points"]
+    good = [state(["a", "b"], 2), state(["b", "a"], 2)]
+    points = bags._states(good)["points"]
     assert [p["positions"] for p in points] == [[0.5, 1.5], [1.5, 0.5]]
-    with pytest.raises(InvalidFile, match=f"message 1: has {q} positions of"):
-        bags._states(file, [good[0], state(names, q)])
+    with pytest.raises(InvalidInput, match=f"message 1: has {q} positions of"):
+        bags._states([good[0], state(names, q)])
 
 
 def test_sizes_of_bags_are_held_before_they_are_read(
@@ -208,7 +248,8 @@ def test_quaternions_turn_as_their_roll_pitch_and_yaw(tilt: float) -> None:
             "rotation": dict(zip("wxyz", turned.tolist(), strict=True)),
         }
         message = {"joint_names": ["f"], "points": [{"transforms": [pose]}]}
-        found = of_message(Path("t"), {"multi_dof_joint_trajectory": message})
+        data = {"multi_dof_joint_trajectory": message}
+        found = of_message(Place.of("t", data))
         rows = rotation_from_rpy(found.q[0, :2:-1])
         w, v = turned[0], turned[1:]
         for row, unit in zip(rows.T, np.eye(3), strict=True):
@@ -224,10 +265,10 @@ POINT = '{{"positions": [{}, 0], {}"time_from_start": {}}}'
     [
         ('"velocities": [0, 1], ', 0, "velocities, expected times too"),
         ('"accelerations": [0, 1], ', 1, "accelerations, expected velocities too"),
-        ("", '{"sec": 1, "nsec": 5}', "time_from_start: is .*expected seconds"),
-        ("", "{}", "time_from_start: is .*expected seconds"),
-        ("", '{"sec": 1, "secs": 2}', "time_from_start: is .*expected seconds"),
-        ("", '{"sec": 1, "nsecs": 5}', "time_from_start: is .*expected seconds"),
+        ("", '{"sec": 1, "nsec": 5}', r"time_from_start .*: is .*expected seconds"),
+        ("", "{}", r"time_from_start .*: is .*expected seconds"),
+        ("", '{"sec": 1, "secs": 2}', r"time_from_start .*: is .*expected seconds"),
+        ("", '{"sec": 1, "nsecs": 5}', r"time_from_start .*: is .*expected seconds"),
         ('"velocities": [0, 0], ', 0, None),
         ('"velocities": [0, 0], "accelerations": [0, 1], ', 1, None),
     ],
@@ -262,7 +303,7 @@ def test_times_are_seconds_or_durations_of_either_ros(
 ) -> None:
     points = [{"positions": [0.0]}, {"positions": [0.0], "time_from_start": stated}]
     points[0]["time_from_start"] = 0  # type: ignore[assignment]
-    found = of_message(Path("t"), {"joint_names": ["a"], "points": points})
+    found = of_message(Place.of("t", {"joint_names": ["a"], "points": points}))
     assert found.times is not None
     assert found.times.tolist() == [0.0, pytest.approx(seconds, rel=1e-15)]
 

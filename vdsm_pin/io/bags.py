@@ -6,7 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io.places import Place
 from vdsm_pin.io.trajectory_messages import message_of, of_message
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 
@@ -48,26 +49,39 @@ def read_bag(file: Path, topic: str | None = None) -> JointTrajectory:
     Raises:
         InvalidFile: If it is not there, not the only one or damaged.
     """
+    with Place.of(file, None).naming():
+        data = _read(file, topic)
+    return of_message(Place.of(file, data))
+
+
+def _read(file: Path, topic: str | None) -> Any:
+    """The one message of a trajectory, in mappings, lists and numbers.
+
+    Raises:
+        InvalidInput: If it is not there, not the only one or damaged.
+    """
     if find_spec("rosbags") is None:
-        problem = "bags need rosbags: pip install 'vdsm-pin[bags]'"
-        raise InvalidFile(file=file, problem=problem)
+        message = "bags need rosbags: pip install 'vdsm-pin[bags]'"
+        raise InvalidInput(message)
     if not file.exists():
-        raise InvalidFile(file=file, problem="does not exist")
+        message = "does not exist"
+        raise InvalidInput(message)
     parts = [file] if file.is_file() else list(file.iterdir())
     if not sum(one.stat().st_size for one in parts) <= LARGEST:
-        problem = f"has more than the {LARGEST >> 30} GiB that are read of a bag"
-        raise InvalidFile(file=file, problem=problem)
+        message = f"has more than the {LARGEST >> 30} GiB that are read of a bag"
+        raise InvalidInput(message)
     try:
-        return _read(file, topic)
+        return _chosen(*_messages(file, topic))
     except InvalidInput:
         raise
     except Exception as error:  # noqa: BLE001 (rosbags raises what it meets)
         said = " ".join(str(error).split())[:200] or type(error).__name__
-        problem = f"cannot be read by rosbags: {said}"
-        raise InvalidFile(file=file, problem=problem) from None
+        message = f"cannot be read by rosbags: {said}"
+        raise InvalidInput(message) from None
 
 
-def _read(file: Path, topic: str | None) -> JointTrajectory:
+def _messages(file: Path, topic: str | None) -> tuple[list[Any], str, str, str]:
+    """Those of the topic, their type, its name, and which of them is asked for."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -80,33 +94,34 @@ def _read(file: Path, topic: str | None) -> JointTrajectory:
         if len(topics) != 1:
             known = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in found}))
             what = f"has no trajectory under topic {name!r}" if name else "has several"
-            what = "has no trajectory" if not found else what
-            problem = f"{what}; topics: {known or 'none'}; choose one by its topic"
-            raise InvalidFile(file=file, problem=problem)
+            message = "has no topic of trajectories"
+            if found:
+                message = f"{what}; topics: {known}; choose one by its topic"
+            raise InvalidInput(message)
         if sum(one.msgcount for one in wanted) > MOST:
-            problem = f"has more than {MOST} messages under topic {topics.pop()}"
-            raise InvalidFile(file=file, problem=problem)
+            message = f"has more than {MOST} messages under topic {topics.pop()}"
+            raise InvalidInput(message)
         messages = [
             reader.deserialize(raw, connection.msgtype)
             for connection, _, raw in reader.messages(connections=wanted)
         ]
-    return _chosen(file, messages, wanted[0].msgtype, topics.pop(), number)
+    return messages, wanted[0].msgtype, topics.pop(), number
 
 
-def _chosen(
-    file: Path, messages: list[Any], kind: str, topic: str, number: str
-) -> JointTrajectory:
+def _chosen(messages: list[Any], kind: str, topic: str, number: str) -> Any:
     """The trajectory in the messages of a topic."""
     if kind == STATES and messages:
-        return of_message(file, _states(file, messages))
-    count = len(messages)
+        return _states(messages)
+    if not (count := len(messages)):
+        message = f"topic {topic} has no message"
+        raise InvalidInput(message)
     if number and not (number.isdecimal() and int(number) < count):
-        problem = f"topic {topic} has messages 0 to {count - 1}, not {number!r}"
-        raise InvalidFile(file=file, problem=problem)
+        message = f"topic {topic} has messages 0 to {count - 1}, not {number!r}"
+        raise InvalidInput(message)
     if count != 1 and not number:
-        problem = f"topic {topic} has {count} messages; choose by topic {topic}#K"
-        raise InvalidFile(file=file, problem=problem)
-    return of_message(file, _plain(messages[int(number or 0)]))
+        message = f"topic {topic} has {count} messages; choose by topic {topic}#K"
+        raise InvalidInput(message)
+    return _plain(messages[int(number or 0)])
 
 
 def _plain(message: Any) -> Any:
@@ -121,17 +136,17 @@ def _plain(message: Any) -> Any:
     return {name: _plain(getattr(message, name)) for name in fields if name[0] != "_"}
 
 
-def _states(file: Path, messages: list[Any]) -> dict[str, Any]:
+def _states(messages: list[Any]) -> dict[str, Any]:
     """Measured states as waypoints, with times from the first."""
     points, names = [], list(messages[0].name)
     first = None
     for k, message in enumerate(messages):
         if sorted(message.name) != sorted(names) or len(message.position) != len(names):
             problem = (
-                f"has {len(message.position)} positions of {message.name}, expected "
-                f"one of each of {names}"
+                f"message {k}: has {len(message.position)} positions of "
+                f"{message.name}, expected one of each of {names}"
             )
-            raise InvalidFile(file=file, where=f"message {k}", problem=problem)
+            raise InvalidInput(problem)
         stamp = message.header.stamp
         time = 1_000_000_000 * stamp.sec + stamp.nanosec  # [ns]
         first = time if first is None else first

@@ -6,8 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_quaternion
+from vdsm_pin.io.places import Place, finite_numbers
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
@@ -30,144 +31,133 @@ def read_joint_trajectory(file: Path) -> JointTrajectory:
         InvalidFile: If it is none or breaks its contract.
     """
     document = read_yaml(read_text(file, limit=MAX_BYTES), file=file)
-    return of_message(file, document.data)
+    return of_message(Place(document, (), document.data))
 
 
-def of_message(file: Path, data: Any) -> JointTrajectory:
+def of_message(data: Place) -> JointTrajectory:
     """A JointTrajectory, by itself or in a RobotTrajectory or a message about one.
 
     A joint of several degrees has the columns NAME/x, /y, /z, /yaw, /pitch, /roll.
 
     Args:
-        file: For messages.
-        data: Mappings, lists and numbers, as of YAML.
+        data: Mappings, lists and numbers.
 
     Raises:
         InvalidFile: If it is no trajectory or breaks its contract.
     """
     message, multi = _found(data)
-    parts = []
-    if message is not None and (message.get("points") or not multi):
-        parts.append(_single(file, message))
-    if multi:
-        parts.append(_multi(file, multi))
-    if not parts:
+    one = other = None
+    if message is not None and (message.get("points").value or multi is None):
+        one = _single(message)
+    if multi is not None:
+        other = _multi(multi)
+    if one is not None and other is not None and multi is not None:
+        with multi.naming():
+            return _together(one, other)
+    if (found := one or other) is None:
         problem = "is no trajectory: expected joint_names and points"
-        raise InvalidFile(file=file, problem=problem)
-    return parts[0] if len(parts) == 1 else _together(file, *parts)
+        raise data.invalid(problem)
+    return found
 
 
-def _found(data: Any) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+def _found(data: Place) -> tuple[Place | None, Place | None]:
     """The JointTrajectory in a message, and the one of joints of several degrees."""
     multi = None
-    while isinstance(data, dict):
-        if "joint_names" in data:
+    while isinstance(data.value, dict):
+        if "joint_names" in data.value:
             return data, multi
-        stated = data.get(MULTI)
-        if isinstance(stated, dict) and stated.get("points"):
+        if (stated := data.get(MULTI)).get("points").value:
             multi = stated
         keys = ("joint_trajectory", "trajectory", "goal")
-        data = next((data[key] for key in keys if key in data), None)
-        if isinstance(data, list):  # of a DisplayTrajectory
-            data = data[0] if len(data) == 1 else None
+        data = next((data[key] for key in keys if key in data.value), data.get("goal"))
+        if isinstance(data.value, list):  # of a DisplayTrajectory
+            if (count := len(data.value)) != 1:
+                problem = f"has {count} trajectories, expected one"
+                raise data.invalid(problem)
+            data = data[0]
     return None, multi
 
 
-def _points(file: Path, message: dict[str, Any]) -> tuple[tuple[str, ...], list[Any]]:
+def _points(message: Place) -> tuple[tuple[str, ...], list[Place]]:
     """Names of joints and points of a message."""
-    names, points = message.get("joint_names"), message.get("points")
-    if not isinstance(names, list) or not isinstance(points, list) or not points:
+    names, points = (message.get(key) for key in ("joint_names", "points"))
+    if not isinstance(names.value, list) or not points.value:
         problem = "is no JointTrajectory: expected joint_names and points"
-        raise InvalidFile(file=file, problem=problem)
-    for name in names:
-        if not isinstance(name, str) or names.count(name) > 1:
+        raise message.invalid(problem)
+    for name in names.value:
+        if not isinstance(name, str) or names.value.count(name) > 1:
             problem = f"has {str(name)[:60]!r}, expected names that differ"
-            raise InvalidFile(file=file, where="joint_names", problem=problem)
-    if len(points) > MAX_ROWS:
-        raise InvalidFile(file=file, problem=f"has more than {MAX_ROWS} points")
-    return tuple(names), points
+            raise names.invalid(problem)
+    if len(found := points.items()) > MAX_ROWS:
+        problem = f"has more than {MAX_ROWS} points"
+        raise message.invalid(problem)
+    return tuple(names.value), found
 
 
-def _single(file: Path, message: dict[str, Any]) -> JointTrajectory:
-    names, points = _points(file, message)
-    q = _values(file, points, "positions", len(names))
+def _single(message: Place) -> JointTrajectory:
+    names, points = _points(message)
+    q, rates, changes = (
+        _values(points, key, len(names))
+        for key in ("positions", "velocities", "accelerations")
+    )
     if q is None:
-        raise InvalidFile(file=file, where="points[0]", problem="has no positions")
-    rates = _values(file, points, "velocities", len(names))
-    changes = _values(file, points, "accelerations", len(names))
-    times = _times(file, points)
-    try:
+        problem = "has no positions"
+        raise points[0].invalid(problem)
+    times = _times(points)
+    with message["points"].naming():
         return JointTrajectory(names, q, times, rates, changes)
-    except InvalidInput as error:
-        raise InvalidFile(file=file, where="points", problem=str(error)) from None
 
 
-def _values(file: Path, points: list[Any], key: str, count: int) -> FloatArray | None:
+def _values(points: list[Place], key: str, count: int) -> FloatArray | None:
     """One list of numbers of each point; None where no point has it."""
-    rows = [point.get(key) if isinstance(point, dict) else None for point in points]
-    if not any(rows):
+    rows = [point.get(key) for point in points]
+    if not any(row.value for row in rows):
         return None
-    for k, row in enumerate(rows):
-        if (numbers := finite_numbers(row, count)) is None:
-            problem = f"is {str(row)[:60]}, expected {count} finite numbers"
-            raise InvalidFile(file=file, where=f"points[{k}].{key}", problem=problem)
-        rows[k] = numbers
-    return np.array(rows, dtype=np.float64)
+    return np.array([row.numbers(count) for row in rows])
 
 
-def finite_numbers(row: Any, count: int) -> list[float] | None:
-    """So many finite numbers; None where it is another thing."""
-    if not isinstance(row, list) or len(row) != count:
-        return None
-    if not all(type(value) in (int, float) for value in row):
-        return None
-    try:
-        numbers = [float(value) for value in row]
-    except OverflowError:
-        return None
-    return numbers if np.isfinite(numbers).all() else None
-
-
-def _times(file: Path, points: list[Any]) -> FloatArray | None:
+def _times(points: list[Place]) -> FloatArray | None:
     """When each point is reached [s]; None where no point says so, or all say 0."""
-    found = [p.get("time_from_start") if isinstance(p, dict) else None for p in points]
-    if all(time is None for time in found):
+    found = [point.get("time_from_start") for point in points]
+    if all(time.value is None for time in found):
         return None
-    times = []
-    for k, stated in enumerate(found):
-        time = [stated]
-        for keys in _TIMES:
-            if isinstance(stated, dict) and stated and stated.keys() <= {*keys}:
-                time = [stated.get(key, 0) for key in keys]
-        numbers = finite_numbers(time, len(time))
-        if numbers is None:
-            where = f"points[{k}].time_from_start"
-            problem = f"is {str(stated)[:60]}, expected seconds"
-            raise InvalidFile(file=file, where=where, problem=problem)
-        times.append(numbers[0] + (_NANO * numbers[1] if len(numbers) > 1 else 0.0))
-    return np.array(times) if len(times) == 1 or any(times) else None
+    times = np.array([_seconds(time) for time in found])
+    return times if len(times) == 1 or times.any() else None
 
 
-def _multi(file: Path, message: dict[str, Any]) -> JointTrajectory:
+def _seconds(time: Place) -> float:
+    """A duration; [s]."""
+    stated = time.value
+    parts = [stated, 0]
+    for keys in _TIMES:
+        if isinstance(stated, dict) and stated and stated.keys() <= {*keys}:
+            parts = [stated.get(key, 0) for key in keys]
+    if (numbers := finite_numbers(parts, 2)) is None:
+        problem = f"is {str(stated)[:60]}, expected seconds"
+        raise time.invalid(problem)
+    return numbers[0] + _NANO * numbers[1]
+
+
+def _multi(message: Place) -> JointTrajectory:
     """Joints of several degrees: their places, and turns about z.
 
     Raises:
         InvalidFile: If one turns about another axis than z on its way: what lies
             between two such turns is no straight line of yaw, pitch and roll.
     """
-    names, points = _points(file, message)
+    names, points = _points(message)
     rows = np.zeros((len(points), len(names), 6))
     for k, point in enumerate(points):
-        transforms = point.get("transforms") if isinstance(point, dict) else None
-        where = f"{MULTI}.points[{k}]"
-        if not isinstance(transforms, list) or len(transforms) != len(names):
-            problem = f"expected transforms, one for each of {len(names)} joints"
-            raise InvalidFile(file=file, where=where, problem=problem)
-        for column, transform in enumerate(transforms):
-            rows[k, column] = _transform(file, f"{where}.transforms", transform)
-        if point.get("velocities"):
+        transforms = point.get("transforms")
+        if not isinstance(transforms.value, list) or len(transforms.value) != len(
+            names
+        ):
+            problem = f"expected one for each of {len(names)} joints"
+            raise transforms.invalid(problem)
+        rows[k] = [_transform(one) for one in transforms.items()]
+        if point.get("velocities").value:
             problem = "has velocities of joints of several degrees, expected none"
-            raise InvalidFile(file=file, where=where, problem=problem)
+            raise point.invalid(problem)
     rows[..., 3:] = np.unwrap(rows[..., 3:], axis=0)
     for column, name in enumerate(names):
         if not (np.ptp(rows[:, column, 4:], axis=0) <= TOLERANCES.still).all():
@@ -175,29 +165,27 @@ def _multi(file: Path, message: dict[str, Any]) -> JointTrajectory:
                 f"joint {name!r} turns about another axis than z between points, "
                 "expected one pitch and roll"
             )
-            raise InvalidFile(file=file, where=MULTI, problem=problem)
+            raise message.invalid(problem)
     rows[..., 4:] = rows[:1, :, 4:]
     whole = tuple(f"{name}/{part}" for name in names for part in _FREE)
-    return JointTrajectory(whole, rows.reshape(len(rows), -1), _times(file, points))
+    return JointTrajectory(whole, rows.reshape(len(rows), -1), _times(points))
 
 
-def _transform(file: Path, where: str, transform: Any) -> FloatArray:
+def _transform(transform: Place) -> FloatArray:
     """x, y, z, yaw, pitch, roll of one transform, shape (6,)."""
     found = []
     for part, keys in (("translation", "xyz"), ("rotation", "xyzw")):
-        stated = transform.get(part) if isinstance(transform, dict) else None
-        values = [stated.get(key) for key in keys] if isinstance(stated, dict) else None
+        place = transform.get(part)
+        values = [place.get(key).value for key in keys]
         if (numbers := finite_numbers(values, len(keys))) is None:
-            problem = (
-                f"{part} is {str(stated)[:60]}, expected numbers {', '.join(keys)}"
-            )
-            raise InvalidFile(file=file, where=where, problem=problem)
+            problem = f"is {str(place.value)[:60]}, expected numbers {', '.join(keys)}"
+            raise place.invalid(problem)
         found += numbers
     quaternion = np.array(found[3:])
     length = float(np.linalg.norm(quaternion))
     if not abs(length - 1.0) <= TOLERANCES.quaternion:
         problem = f"rotation has length {length:g}, expected 1"
-        raise InvalidFile(file=file, where=where, problem=problem)
+        raise transform.invalid(problem)
     turn = rotation_from_quaternion(quaternion / length)
     yaw = np.arctan2(turn[1, 0], turn[0, 0])
     c, s = np.cos(yaw), np.sin(yaw)
@@ -207,31 +195,25 @@ def _transform(file: Path, where: str, transform: Any) -> FloatArray:
     return np.array([*found[:3], yaw, pitch, roll])
 
 
-def _together(
-    file: Path, one: JointTrajectory, other: JointTrajectory
-) -> JointTrajectory:
+def _together(one: JointTrajectory, other: JointTrajectory) -> JointTrajectory:
     """Both parts of a RobotTrajectory, whose points are the same moments.
 
     Raises:
-        InvalidFile: If they are not, or one part has velocities alone.
+        InvalidInput: If they are not, or one part has velocities alone.
     """
     if len(one.q) != len(other.q):
-        problem = f"has {len(other.q)} points beside {len(one.q)} of joint_trajectory"
-        raise InvalidFile(file=file, where=MULTI, problem=problem)
+        message = f"has {len(other.q)} points beside {len(one.q)} of joint_trajectory"
+        raise InvalidInput(message)
     if one.rates is not None:
-        problem = "has no velocities, but joint_trajectory has: leave them out"
-        raise InvalidFile(file=file, where=MULTI, problem=problem)
+        message = "has no velocities, but joint_trajectory has: leave them out"
+        raise InvalidInput(message)
     times = other.times
     if times is None or one.times is None:
         times = one.times
     elif not np.array_equal(one.times, times):
-        problem = "has other times than joint_trajectory"
-        raise InvalidFile(file=file, where=MULTI, problem=problem)
-    q = np.hstack([one.q, other.q])
-    try:
-        return JointTrajectory(one.names + other.names, q, times)
-    except InvalidInput as error:
-        raise InvalidFile(file=file, where=MULTI, problem=str(error)) from None
+        message = "has other times than joint_trajectory"
+        raise InvalidInput(message)
+    return JointTrajectory(one.names + other.names, np.hstack([one.q, other.q]), times)
 
 
 def message_of(motion: JointTrajectory) -> dict[str, Any]:

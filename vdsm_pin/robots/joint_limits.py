@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.io.places import Place
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.robots.model import RobotJoint, Values
-from vdsm_pin.robots.places import Place
 from vdsm_pin.tolerances import TOLERANCES
 
 MAX_BYTES: Final = 4 << 20

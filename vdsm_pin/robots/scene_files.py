@@ -14,6 +14,7 @@ from vdsm_pin.geometry.solids import Box, Cylinder, HalfSpace, Mesh, Sphere
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
+from vdsm_pin.io.places import Place
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.schema_types import FileModel
@@ -21,7 +22,6 @@ from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.robots.mjcf import read_mjcf
-from vdsm_pin.robots.places import Place
 from vdsm_pin.robots.scene_text import read_scene_text
 from vdsm_pin.tolerances import TOLERANCES
 

@@ -169,11 +169,15 @@ def _check_times(file: File, times: FloatArray | None) -> None:
     if times is None or rises.all():
         return
     row = int(np.argmin(rises)) + 1
-    points = is_bag(file) or file.suffix.lower() in ENDINGS
     problem = f"time is {times[row]:.12g} s after {times[row - 1]:.12g} s, expected it "
     problem += "to rise from row to row"
-    where = f"points[{row}]" if points else f"line {row + 2}"
+    where = f"points[{row}]" if _has_points(file) else f"line {row + 2}"
     raise InvalidFile(file=file, where=where, problem=problem)
+
+
+def _has_points(file: File) -> bool:
+    """Whether waypoints are points of a message, and no rows of a table."""
+    return is_bag(file) or file.suffix.lower() in ENDINGS
 
 
 def _of_joints(
@@ -210,9 +214,10 @@ def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> Non
         if not most <= joint.most_unstated:
             limits = np.isfinite([joint.lower, joint.upper]).any()
             row = int(np.argmax(np.abs(q[:, k])))
+            table = "" if _has_points(file) else "_deg, for any number of turns, or "
             problem = (
                 f"joint {joint.name!r} turns to {most:.4g} rad at waypoint {row}; "
-                "is it in degrees? expected _deg, for any number of turns, or radians"
+                f"is it in degrees? expected {table}radians"
                 + ("" if limits else ", at most two turns either way without limits")
             )
             raise InvalidFile(file=file, problem=problem)

@@ -1,5 +1,6 @@
 """Values of a YAML or JSON document that know where they stand."""
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,7 +8,6 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.trajectory_messages import finite_numbers
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 
 
@@ -18,6 +18,11 @@ class Place:
     document: YamlDocument
     at: Location
     value: Any
+
+    @classmethod
+    def of(cls, file: object, data: Any) -> "Place":
+        """All of what a file holds, whose lines are not known."""
+        return cls(YamlDocument(file, data, {}), (), data)
 
     def __getitem__(self, key: str | int) -> "Place":
         """What stands under a key or number.
@@ -34,10 +39,11 @@ class Place:
             problem = f"has no {key!r}"
             raise self.invalid(problem) from None
 
-    def get(self, key: str, default: Any) -> "Place":
+    def get(self, key: str, default: Any = None) -> "Place":
         """What stands under a key, or a default."""
         has = isinstance(self.value, dict) and self.value.get(key) is not None
-        return self[key] if has else Place(self.document, self.at, default)
+        value = self.value[key] if has else default
+        return Place(self.document, (*self.at, key), value)
 
     def items(self) -> list["Place"]:
         """Of a list.
@@ -77,10 +83,27 @@ class Place:
         """
         values = finite_numbers(self.value, count)
         if values is None:
-            problem = f"is {str(self.value)[:60]}, expected {count} numbers"
+            problem = f"is {str(self.value)[:60]}, expected {count} finite numbers"
             raise self.invalid(problem)
         return np.array(values, dtype=np.float64)
+
+    def naming(self) -> AbstractContextManager[None]:
+        """Name the value where it makes what is done within invalid."""
+        return self.document.naming(self.at)
 
     def invalid(self, problem: str) -> InvalidFile:
         """The value is not what is expected."""
         return self.document.invalid(self.at, problem)
+
+
+def finite_numbers(row: Any, count: int) -> list[float] | None:
+    """So many finite numbers; None where it is another thing."""
+    if not isinstance(row, list) or len(row) != count:
+        return None
+    if not all(type(value) in (int, float) for value in row):
+        return None
+    try:
+        numbers = [float(value) for value in row]
+    except OverflowError:
+        return None
+    return numbers if np.isfinite(numbers).all() else None
