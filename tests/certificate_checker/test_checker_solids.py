@@ -110,3 +110,23 @@ def test_hulls_of_open_meshes_share_a_point_where_they_are_near(
     for wrong in ([[0], [1]], [[0, 1]], [[1], [2]]):
         with pytest.raises(Rejected, match="pieces of m do not make up the whole"):
             hulls("m", corners, wrong)
+
+
+@pytest.mark.parametrize("again", [0, 1, 2])
+@pytest.mark.parametrize("solids", [1, 2])
+def test_hulls_of_closed_meshes_share_a_point_where_they_share_a_corner(
+    again: int, solids: int
+) -> None:
+    """Two tetrahedra near one another have each its own, also of faces given twice."""
+    tips = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    faces = tips[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
+    whole = [faces, faces - [1.0 + 1e-4, 0.0, 0.0]][:solids]
+    corners = np.concatenate([*whole, faces[:again]])
+    n = len(corners)
+    groups = [[0, 1, *range(4 * solids, n)], [2, 3], [4, 5, 6, 7]][: 1 + solids]
+    ways = [[*groups[0], *groups[1]]] * 2 + groups[2:]
+    middles = [corners[way].mean(axis=(0, 1)) for way in ways]
+    found = hulls("m", corners, groups)
+    for points, group, middle in zip(found, groups, middles, strict=True):
+        expected = np.unique([*corners[group].reshape(-1, 3), middle], axis=0)
+        np.testing.assert_allclose(points, expected, rtol=0, atol=1e-12)
