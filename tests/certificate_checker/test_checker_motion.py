@@ -119,8 +119,12 @@ def test_a_closed_path_left_in_between_is_drawn_once(
     path |= {"required_coverage": 0.5, "order": order}
     on = [1, 1, 0, 1, 1, 1, 1, 1, 1]
     case = along(tmp_path, x0, tip_path=path, on_path=on, path_m=station)
-    assert ("begun again" in refusal(case)) is not good
-    assert (refusal(case) == "") is good
+    found = refusal(case)
+    assert (found == "") is good
+    past = 1e3 * (more - 1e-6)  # the tolerance of the tip
+    assert (
+        good or found == f"header: the path is begun again, {past:.12g} mm past its end"
+    )
 
 
 def edited(case: Case, change: Any) -> str:
