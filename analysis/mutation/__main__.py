@@ -97,7 +97,7 @@ def tried(
             Task(
                 one,
                 seen.asked(*place),
-                asked.budget * (1 if seen.runs(*place) else WIDER),
+                asked.budget * (1 if seen.runs(*place) or not one.line else WIDER),
             )
             for one in [_as_it_is(mine[0].module), *mine, _as_it_is(mine[-1].module)]
             for place in [(one.module, one.lines)]

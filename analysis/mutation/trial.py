@@ -159,6 +159,8 @@ class Bench:
         change, begun = task.change, time.monotonic()
         if not task.tests:
             return Trial(change, False, 0, 0.0)
+        if not change.line:
+            return Trial(change, self._fail(task, items), len(task.tests), 0.0)
         module = self._folder / change.module
         code = new_code(module, change.content)
         if code is None:
@@ -167,6 +169,17 @@ class Bench:
             status = self._replaced(module, code, task, items)
         seconds = time.monotonic() - begun
         return Trial(change, status != 0, len(task.tests), seconds)
+
+    def _fail(self, task: Task, items: dict[str, pytest.Item]) -> bool:
+        """Whether tests fail here and now, where nothing is changed.
+
+        What they load, modules and machine code, is loaded in every child from then on.
+        """
+        self._failed = False
+        for name in task.asked():
+            item = items[name]
+            item.ihook.pytest_runtest_protocol(item=item, nextitem=None)
+        return self._failed
 
     def _replaced(
         self, module: Path, code: dict[tuple[str, int], CodeType], task: Task,

@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls, Piece
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Hulls, Piece
 from vdsm_pin.geometry.solids import BOX_CORNERS
-from vdsm_pin.verification.contacts import Placed, common_ball
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification import contacts
+from vdsm_pin.verification.contacts import (
+    MOST_PIECES,
+    Placed,
+    common_ball,
+    nearest_pieces,
+)
 
 BALL = Hull(np.zeros((1, 3)), 0.1)
 CAPSULE = Hull(np.array([[0.0, 0.0, -0.2], [0.0, 0.0, 0.2]]), 0.1)
@@ -77,3 +84,168 @@ def test_of_many_pieces_the_near_ones_are_looked_at() -> None:
     many = Placed(Hulls(np.concatenate([far, through])))
     assert common_ball(many, body, np.zeros(3))[0] > 0.01
     assert common_ball(Placed(Hulls(far)), body, np.zeros(3))[0] == 0.0
+
+
+ROUNDED = Hull(BOX_CORNERS * 0.1, 0.05)
+SOLIDS = PIECES | {
+    "rounded box": ROUNDED,
+    "half-space": HalfSpacePiece(np.array([0.6, 0.0, 0.8]), 0.1),
+}
+DEEP = HalfSpacePiece(np.array([0.0, 0.0, 1.0]), 9.0)
+LOST = TOLERANCES.bracket_gap + TOLERANCES.arithmetic
+
+
+def depth_of(piece: Piece, x: FloatArray) -> float:
+    """How deep a point near the middle lies, in closed form."""
+    if piece is BALL:
+        return 0.1 - float(np.linalg.norm(x))
+    if piece is CAPSULE:
+        return 0.1 - float(np.hypot(x[0], x[1]))
+    if piece is CYLINDER:
+        return min(0.1 - float(np.hypot(x[0], x[1])), 0.2 - abs(float(x[2])))
+    if isinstance(piece, HalfSpacePiece):
+        return piece.offset - float(piece.normal @ x)
+    assert isinstance(piece, Hull)
+    return 0.1 + piece.radius - float(np.abs(x).max())
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_where_it_begins_the_ball_is_of_the_depth_there(name: str) -> None:
+    """No deeper point is looked for: nine tenths, a third of it, less what is lost."""
+    rng, piece = np.random.default_rng(5), SOLIDS[name]
+    for _ in range(8):
+        pose, x = np.eye(4), rng.uniform(-0.05, 0.05, 3)
+        pose[:3, :3] = rotation_from_rpy(rng.uniform(-3.0, 3.0, 3))
+        pose[:3, 3] = rng.uniform(-1.0, 1.0, 3)
+        start = pose[:3, :3] @ x + pose[:3, 3]
+        expected = 0.3 * depth_of(piece, x) - LOST
+        for both in ((piece, DEEP), (DEEP, piece)):
+            mine, theirs = (
+                Placed([one], np.eye(4) if one is DEEP else pose) for one in both
+            )
+            radius, centre = common_ball(mine, theirs, start, 0.0)
+            assert radius == pytest.approx(expected, abs=1e-12)
+            assert (centre == start).all()
+
+
+def test_a_ball_must_be_larger_than_what_is_lost() -> None:
+    """Both sides of the limit."""
+    pose = np.eye(4)
+    for depth in (LOST / 0.3 + 1e-9, LOST / 0.3 - 1e-9):
+        x = np.array([0.1 - depth, 0.0, 0.0])
+        radius, _ = common_ball(Placed([BOX], pose), Placed([DEEP]), x, 0.0)
+        assert radius == pytest.approx(max(0.0, 0.3 * depth - LOST), abs=1e-15)
+    nowhere = np.array([0.0, np.nan, 0.0])
+    assert common_ball(Placed([BOX]), Placed([DEEP]), nowhere)[0] == 0.0
+
+
+def test_the_ball_is_that_in_a_regular_tetrahedron(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = list[FloatArray]()
+
+    def hold(pieces: object, corners: FloatArray, lost: float) -> bool:
+        seen.append(corners)
+        return True
+
+    monkeypatch.setattr(contacts, "_hold", hold)
+    x = np.array([0.01, 0.02, 0.03])
+    radius, centre = common_ball(Placed([BALL]), Placed([DEEP]), x, 0.0)
+    (corners,) = seen
+    away = (corners - centre) / (3.0 * (radius + LOST))
+    np.testing.assert_allclose(away @ away.T, (4.0 * np.eye(4) - 1.0) / 3.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("out", "share"), [(0.0, 0.9), (0.5, 0.5), (0.8, 0.1)])
+def test_near_a_rounded_corner_a_smaller_ball_is_tried(
+    out: float, share: float
+) -> None:
+    """Its planes say that it is deeper there than it is."""
+    x = np.full(3, 0.1 + 0.05 * out / 3**0.5)
+    seeming = 0.05 * (1.0 - out / 3**0.5)
+    radius, _ = common_ball(Placed([ROUNDED]), Placed([DEEP]), x, 0.0)
+    assert radius == pytest.approx(share * seeming / 3.0 - LOST, abs=1e-12)
+    assert radius <= 0.05 * (1.0 - out)
+
+
+@pytest.mark.parametrize("wrong", [0.06, 0.3, 10.0])
+def test_a_depth_that_is_wrong_is_not_believed(
+    wrong: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All or some of the corners are outside."""
+
+    def lying(*arguments: object) -> float:
+        where = arguments[-1]
+        assert isinstance(where, np.ndarray)
+        where[:] = 0.0, 0.0, 0.099
+        return wrong
+
+    monkeypatch.setattr(contacts, "climb", lying)
+    monkeypatch.setattr(contacts, "SHARES", (0.9,))
+    assert common_ball(Placed([BOX]), Placed([CAPSULE]), np.zeros(3))[0] == 0.0
+
+
+def test_pieces_without_an_inside_have_a_ball_in_the_other() -> None:
+    """A line and triangles, grown or not; two of them have none."""
+    line = Hull(np.array([[-1.0, 0.0, 0.0], [1.0, 0.01, 0.0]]))
+    flat = np.array([[-1.0, 0.02, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]])
+    for thin in (line, Hull(flat), Hull(flat, 0.01)):
+        for mine, theirs in ((thin, BOX), (BOX, thin)):
+            radius, centre = common_ball(Placed([mine]), Placed([theirs]), np.zeros(3))
+            assert 0.02 < radius < 0.1 / 3.0
+            assert abs(centre[1]) <= 0.02
+    assert common_ball(Placed([line]), Placed([Hull(flat)]), np.zeros(3))[0] == 0.0
+
+
+@pytest.mark.parametrize("count", [3, MOST_PIECES, MOST_PIECES + 1, 3 * MOST_PIECES])
+@pytest.mark.parametrize("radius", [0.0, 0.3])
+def test_pieces_are_taken_by_how_near_their_boxes_are(
+    count: int, radius: float
+) -> None:
+    rng = np.random.default_rng(count)
+    for _ in range(5):
+        corners, point = rng.uniform(-2.0, 2.0, (count, 3, 3)), rng.uniform(-2, 2, 3)
+        pieces: list[Piece] = [Hull(one, radius) for one in corners]
+        cylinders = [
+            FlatCylinder(p, q / np.linalg.norm(q), 0.1, 0.05)
+            for p, q in rng.uniform(-2.0, 2.0, (count, 2, 3))
+        ]
+        # A cylinder is at most as far from its centre as its length and radius reach.
+        for some, low, high in (
+            (pieces, corners.min(axis=1), corners.max(axis=1)),
+            (
+                cylinders,
+                np.array([c.centre - 0.15 for c in cylinders]),
+                np.array([c.centre + 0.15 for c in cylinders]),
+            ),
+        ):
+            grown = radius if some is pieces else 0.0
+            off = point - np.clip(point, low - grown, high + grown)
+            order = np.argsort(np.linalg.norm(off, axis=1), kind="stable")
+            found = nearest_pieces(some, point)
+            assert len(found) == min(count, MOST_PIECES)
+            if count <= MOST_PIECES:
+                assert [id(one) for one in found] == [id(one) for one in some]
+            else:
+                wanted = {id(some[k]) for k in order[:MOST_PIECES]}
+                assert {id(one) for one in found} == wanted
+        off = point - np.clip(point, corners.min(axis=1), corners.max(axis=1))
+        order = np.argsort(np.linalg.norm(off, axis=1), kind="stable")
+        packed = nearest_pieces(Hulls(corners, radius), point)
+        kept = order[:MOST_PIECES] if count > MOST_PIECES else np.arange(count)
+        for one, k in zip(packed, kept, strict=True):
+            assert isinstance(one, Hull) and (one.points == corners[k]).all()
+
+
+def test_a_far_piece_among_many_is_found_wherever_the_body_stands() -> None:
+    """The witness is told in the world, the pieces in their frame."""
+    rng = np.random.default_rng(2)
+    balls = [Hull(p[None], 0.01) for p in rng.uniform(-3.0, 3.0, (300, 3))]
+    for k in (7, 130, 299):
+        pose = np.eye(4)
+        pose[:3, :3] = rotation_from_rpy(rng.uniform(-3.0, 3.0, 3))
+        pose[:3, 3] = rng.uniform(-5.0, 5.0, 3)
+        point = pose[:3, :3] @ balls[k].points[0] + pose[:3, 3]
+        radius, centre = common_ball(Placed(balls, pose), Placed([DEEP]), point, 0.0)
+        assert radius == pytest.approx(0.003 - LOST, abs=1e-12)
+        assert (centre == point).all()

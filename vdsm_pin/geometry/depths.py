@@ -38,20 +38,20 @@ class Inside(NamedTuple):
 
     Args:
         kind: PLANES, CYLINDER or CAPSULE.
+        radius: Of a cylinder, or by which the rest is grown; [m].
         normals: Outward unit normals of its planes, shape (m, 3); [-].
         offsets: n.x on them, shape (m,); [m].
         spine: Centre and axis of a cylinder, start and way to the end of a capsule's
             segment, shape (2, 3).
         half_length: Of a cylinder; [m].
-        radius: Of a cylinder, or by which the rest is grown; [m].
     """
 
     kind: int
-    normals: FloatArray
-    offsets: FloatArray
-    spine: FloatArray
-    half_length: float
     radius: float
+    normals: FloatArray = np.zeros((0, 3))
+    offsets: FloatArray = np.zeros(0)
+    spine: FloatArray = np.zeros((2, 3))
+    half_length: float = 0.0
 
 
 @compiled

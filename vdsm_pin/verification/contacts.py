@@ -80,17 +80,16 @@ def common_ball(
     if not np.isfinite(point).all():
         return 0.0, point
     lost = TOLERANCES.bracket_gap + TOLERANCES.arithmetic
-    for both in product(_near(one, point), _near(other, point)):
-        if not _may_meet(both[0].piece, both[1].piece):
+    for mine, theirs in product(_near(one, point), _near(other, point)):
+        if not _may_meet(mine.piece, theirs.piece):
             continue
-        thick = [near.piece for near in both if near.inside is not None]
+        thick = [near.piece for near in (mine, theirs) if near.inside is not None]
         if not thick:
             continue
-        depth, centre = _deepest(both, point, enough)
+        depth, centre = _deepest(mine, theirs, point, enough)
         for share in SHARES:
-            corners = centre + share * depth * CORNERS
             radius = share * depth / 3.0 - lost
-            if radius > 0.0 and _hold(thick, corners, lost):
+            if radius > 0.0 and _hold(thick, centre + share * depth * CORNERS, lost):
                 return radius, centre
     return 0.0, point
 
@@ -110,25 +109,25 @@ class _Near:
     @cached_property
     def inside(self) -> Inside | None:
         """What bounds it; None of one without an inside."""
-        piece, none = self.piece, np.zeros((2, 3))
+        piece = self.piece
         if isinstance(piece, HalfSpacePiece):
-            offsets = np.array([piece.offset])
-            return Inside(PLANES, piece.normal[None].copy(), offsets, none, 0.0, 0.0)
-        blank = np.zeros((0, 3)), np.zeros(0)
+            normals, offsets = piece.normal[None].copy(), np.array([piece.offset])
+            return Inside(PLANES, 0.0, normals, offsets)
         if isinstance(piece, FlatCylinder):
             spine = np.array([piece.centre, piece.axis])
-            return Inside(CYLINDER, *blank, spine, piece.half_length, piece.radius)
+            length = piece.half_length
+            return Inside(CYLINDER, piece.radius, spine=spine, half_length=length)
         first, last = piece.points[0], piece.points[-1]
         if len(piece.points) <= 2 and piece.radius > 0.0:
             spine = np.array([first, last - first])
-            return Inside(CAPSULE, *blank, spine, 0.0, piece.radius)
+            return Inside(CAPSULE, piece.radius, spine=spine)
         assert isinstance(self._own, Hull)
         planes = _planes(np.asarray(self._own.points, np.float64).tobytes())
         if planes is None:
             return None
         normals = planes[0] @ self._pose[:3, :3].T
         offsets = planes[1] + normals @ self._pose[:3, 3]
-        return Inside(PLANES, normals, offsets, none, 0.0, piece.radius)
+        return Inside(PLANES, piece.radius, normals, offsets)
 
 
 @lru_cache(maxsize=KEPT)
@@ -144,15 +143,14 @@ def _near(body: Placed, point: FloatArray) -> list[_Near]:
 
 
 def _deepest(
-    both: tuple[_Near, _Near], point: FloatArray, enough: float
+    one: _Near, other: _Near, point: FloatArray, enough: float
 ) -> tuple[float, FloatArray]:
     """A point deep in two pieces of which one at least has an inside; how deep."""
-    where, start = np.zeros(3), np.array(point)
-    one, other = (near.inside for near in both)
-    if one is not None and other is not None:
-        return climb(one, other, start, enough, where), where
-    flat, thick = (both[0], other) if one is None else (both[1], one)
-    assert isinstance(flat.piece, Hull) and thick is not None  # all others have one
+    where = np.zeros(3)
+    if one.inside is not None and other.inside is not None:
+        return climb(one.inside, other.inside, np.array(point), enough, where), where
+    flat, thick = (one, other.inside) if one.inside is None else (other, one.inside)
+    assert isinstance(flat.piece, Hull)  # all others have an inside
     return deepest_of(np.array(flat.piece.points), thick, where), where
 
 
@@ -173,21 +171,20 @@ def nearest_pieces(pieces: Sequence[Piece], point: FloatArray) -> list[Piece]:
 
 
 def _box(piece: Piece) -> tuple[FloatArray, FloatArray]:
-    """Two corners of a box that holds a piece with bounds."""
+    """Two corners of a box that holds a piece."""
+    if isinstance(piece, HalfSpacePiece):
+        return np.full(3, -np.inf), np.full(3, np.inf)
     if isinstance(piece, Hull):
-        return piece.points.min(axis=0), piece.points.max(axis=0)
-    assert isinstance(piece, FlatCylinder)  # a half-space is alone
+        low, high = piece.points.min(axis=0), piece.points.max(axis=0)
+        return low - piece.radius, high + piece.radius
     reach = piece.half_length + piece.radius
     return piece.centre - reach, piece.centre + reach
 
 
 def _may_meet(one: Piece, other: Piece) -> bool:
     """Whether the boxes of two pieces meet."""
-    if isinstance(one, HalfSpacePiece) or isinstance(other, HalfSpacePiece):
-        return True
     (low, high), (least, most) = _box(one), _box(other)
-    grown = sum(piece.radius for piece in (one, other) if isinstance(piece, Hull))
-    return bool((low <= most + grown).all() and (least <= high + grown).all())
+    return bool((low <= most).all() and (least <= high).all())
 
 
 def _hold(pieces: Sequence[Piece], corners: FloatArray, lost: float) -> bool:
