@@ -99,7 +99,7 @@ def tried(
                 seen.asked(*place),
                 asked.budget * (1 if seen.runs(*place) or not one.line else WIDER),
             )
-            for one in [_as_it_is(mine[0].module), *mine, _as_it_is(mine[-1].module)]
+            for one in [*[_as_it_is(mine[0].module)] * asked.jobs, *mine]
             for place in [(one.module, one.lines)]
         ]
         for trial in tried_at_once(tasks, PLAIN if plain else None, asked.jobs):

@@ -222,7 +222,7 @@ class Bench:
             name = module.relative_to(self._folder).with_suffix("").as_posix()
             importlib.import_module(name.replace("/", ".").removesuffix(".__init__"))
             self._functions[module] = [
-                found for found in gc.get_objects() if isinstance(found, FunctionType)
+                found for found in gc.get_objects() if type(found) is FunctionType
                 and found.__code__.co_filename == str(module)
             ]  # fmt: skip
         return self._functions[module]

@@ -11,6 +11,8 @@ import trimesh
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.geometry.solids import Cylinder, Mesh, PointCloud, Prism, Sphere
@@ -28,7 +30,15 @@ from vdsm_pin.verification.coal_bodies import (
     measure,
 )
 from vdsm_pin.verification.coal_check import check_coal
-from vdsm_pin.verification.coal_hulls import CoalBody, swept_polygon
+from vdsm_pin.verification.coal_hulls import (
+    FLAT,
+    CoalBody,
+    coal_parts,
+    hull_planes,
+    is_solid,
+    swept_polygon,
+)
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides, disagreement
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -303,3 +313,123 @@ def test_the_faces_of_a_swept_polygon_enclose_it(n: int) -> None:
     swept = swept_polygon(np.vstack(ends))
     area = n / 2.0 * np.sin(2.0 * np.pi / n)
     assert swept.computeVolume() == pytest.approx(2.0 * area, rel=1e-12)
+
+
+CUBE = np.array(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij")).reshape(3, 8).T
+
+
+def test_pieces_stand_where_they_are() -> None:
+    """A ball, a rod with round ends or flat ones, a cube: a small ball beside each."""
+    rng, request = np.random.default_rng(6), distance_request()
+    for _ in range(20):
+        turn, shift = rotation_from_rpy(rng.uniform(-3, 3, 3)), rng.uniform(-5, 5, 3)
+        x, y, z = turn.T
+        length = rng.uniform(0.5, 3.0)
+        rod = np.array([shift - z * length, shift + z * length])
+        for piece, out, gap in (
+            (Hull(shift[None], 0.3), 2.0 * x, 1.6),
+            (Hull(rod, 0.3), 2.0 * x, 1.6),
+            (Hull(rod, 0.3), (length + 1.0) * z, 0.6),
+            (FlatCylinder(shift, z, length, 0.3), 2.0 * y, 1.6),
+            (FlatCylinder(shift, z, length, 0.3), (length + 1.0) * z, 0.9),
+            (Hull(CUBE @ turn.T + shift), 2.0 * x + 0.5 * y + 0.5 * z, 0.9),
+        ):
+            parts = coal_parts([piece])
+            assert parts is not None
+            pose = coal.Transform3s(np.eye(3), shift + out)
+            found = measure(request, coal.Sphere(0.1), pose, parts)
+            assert found.distance == pytest.approx(gap, abs=1e-7)
+
+
+def test_pieces_that_coal_cannot_take_are_told() -> None:
+    ball, point = Hull(np.zeros((1, 3)), 0.1), np.ones(3)
+    flat, half = Hull(CUBE[:4]), HalfSpacePiece(np.eye(3)[0], 1.0)
+    for bad in (flat, half, Hull(np.array([point, point]), 0.1)):
+        assert coal_parts([ball, bad]) is None
+    two = coal_parts([ball, Hull(CUBE)])
+    assert two is not None and len(two) == 2
+    assert hull_planes(CUBE[:4]) is None
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("away", [0.0, 1e3])
+def test_points_are_solid_where_they_are_far_from_every_plane(
+    size: float, away: float
+) -> None:
+    rng, turn = np.random.default_rng(1), rotation_from_rpy(np.array([0.3, 0.5, 2.0]))
+    tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    assert not is_solid(size * rng.normal(size=(3, 3)) + away)
+    for share, solid in ((1.0, True), (10.0 * FLAT, True), (0.1 * FLAT, False)):
+        points = size * tetrahedron * [1.0, 1.0, share] @ turn.T
+        if away * 1e-16 < 1e-3 * size * share:  # else lost in rounding
+            assert is_solid(points + away) is solid
+
+
+def test_the_planes_of_a_hull_hold_it_closely() -> None:
+    """Of a cube moved and turned: six directions, each at its face."""
+    turn, shift = rotation_from_rpy(np.array([0.3, 0.5, 2.0])), np.array([3.0, -2, 1])
+    corners = CUBE @ turn.T + shift
+    planes = hull_planes(corners)
+    assert planes is not None
+    normals, offsets = planes
+    heights = corners @ normals.T - offsets
+    np.testing.assert_allclose(heights.max(axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(heights.min(axis=0), -1.0, atol=1e-12)
+    seen = {tuple(np.round(n @ turn).astype(int)) for n in normals}
+    assert seen == {tuple(s * row) for row in np.eye(3, dtype=int) for s in (1, -1)}
+
+
+def test_bodies_on_frames_are_as_far_apart_as_their_nearest_balls() -> None:
+    """Bodies of one ball, of three, a cloud and none, on frames at rest and not."""
+    rng = np.random.default_rng(12)
+    balls = [rng.uniform(-1, 1, (n, 3)) for n in (1, 3, 200, 2, 0, 1)]
+    radii, frames = [0.1, 0.05, 0.02, 0.07, 0.0, 0.03], [1, 2, 0, 0, 3, 3]
+    bodies = [coal_parts([Hull(c[None], r) for c in some])
+              for some, r in zip(balls, radii, strict=True)]  # fmt: skip
+    shapes = [*bodies[:2], coal_bodies(PointCloud("c", balls[2], 0.02)), bodies[3],
+              None, bodies[5]]  # fmt: skip
+    poses = np.zeros((4, 4, 3, 4))
+    poses[..., :3] = np.eye(3)
+    for row in range(4):
+        for frame in (1, 2, 3):
+            poses[row, frame, :, :3] = rotation_from_rpy(rng.uniform(-3, 3, 3))
+            poses[row, frame, :, 3] = rng.uniform(-4, 4, 3)
+    pairs = [(i, j) for i in (0, 1, 3, 4, 5) for j in range(6) if i != j]
+    rows = rng.integers(0, 4, len(pairs))
+    for some in (range(len(pairs)), [k for k, p in enumerate(pairs) if p[1] in (2, 3)]):
+        sides = Sides(rows[some], *np.array([pairs[k] for k in some]).T)
+        found = CoalShapes(frames, shapes).distances(poses, sides)
+        for n, k in enumerate(some):
+            i, j = pairs[k]
+            if 4 in (i, j):
+                assert np.isnan(found.distance[n])
+                continue
+            place = [poses[rows[k], frames[b]] for b in (i, j)]
+            one, other = (
+                balls[b] @ T[:, :3].T + T[:, 3]
+                for b, T in zip((i, j), place, strict=True)
+            )
+            gaps = np.linalg.norm(one[:, None] - other[None], axis=2)
+            a, b = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
+            gap = gaps[a, b] - radii[i] - radii[j]
+            assert gap > 0.0 and found.distance[n] == pytest.approx(gap, abs=1e-12)
+            way = (other[b] - one[a]) / gaps[a, b]
+            T = place[1]
+            ends = one[a] + radii[i] * way, other[b] - radii[j] * way
+            for told, point in zip((found.near[n], found.far[n]), ends, strict=True):
+                np.testing.assert_allclose(T[:, :3] @ told + T[:, 3], point, atol=1e-9)
+
+
+def test_a_disagreement_is_what_lies_outside_the_bracket() -> None:
+    cases = (
+        (0.5, 0.4, 0.6, -0.1),
+        (0.3, 0.4, 0.6, 0.1),
+        (0.8, 0.4, 0.6, 0.2),
+        (-0.5, -0.9, -0.1, 0.0),  # where bodies meet the sign alone counts
+        (-0.5, 0.25, 0.5, 0.25),
+        (0.5, -0.9, -0.1, 0.5),
+        (-np.inf, -1.0, 1.0, np.inf),
+        (np.nan, -1.0, 1.0, np.nan),
+    )
+    distance, lower, upper, expected = np.array(cases).T
+    np.testing.assert_allclose(disagreement(distance, lower, upper), expected)
