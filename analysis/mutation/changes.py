@@ -120,6 +120,7 @@ class _Places(ast.NodeVisitor):
     def __init__(self) -> None:
         self.found: list[tuple[ast.AST, str]] = []
         self._within: list[str] = []
+        self._open: set[ast.AST] = set()
 
     def visit(self, node: ast.AST) -> None:
         """Note a node and go on below it, where it is no annotation and no text."""
@@ -127,6 +128,12 @@ class _Places(ast.NodeVisitor):
             return
         if isinstance(node, ast.keyword) and node.arg == "strict":
             return  # of zip: what is alike is known to be
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "reshape":
+            # The size left open is -1 or any other below 0.
+            self._open |= {arg.operand for arg in node.args
+                           if isinstance(arg, ast.UnaryOp)}  # fmt: skip
+        if node in self._open:
+            return
         self.found.append((node, ".".join(self._within)))
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             self._within.append(node.name)

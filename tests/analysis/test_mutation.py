@@ -67,6 +67,11 @@ def test_changes_alike_in_one_function_are_told_apart(tmp_path: Path) -> None:
 def test_text_and_annotations_stay(tmp_path: Path) -> None:
     (tmp_path / "module.py").write_text(MODULE)
     assert not any("+" in one.before for one in changes(tmp_path, "module.py"))
+    (tmp_path / "module.py").write_text("y = x.reshape(-1, 3)[-1]\n")
+    found = {(one.before, one.after) for one in changes(tmp_path, "module.py")}
+    # -2 is the same size left open, but another place.
+    assert found == {("-1", "1"), ("1", "2"), ("3", "4")}
+    assert len(changes(tmp_path, "module.py")) == 4
 
 
 def test_what_runs_at_import_has_its_effect_where_its_name_is_used(

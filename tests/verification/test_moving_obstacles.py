@@ -12,6 +12,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.coal_arm import SPREAD, CoalArm
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
@@ -383,3 +384,31 @@ def test_a_motion_without_times_is_refused(tmp_path: Path) -> None:
     rows = Trajectory(none > 0, none, none, np.zeros((2, 3)), np.zeros((2, 3)))
     with pytest.raises(InvalidInput, match=r"time_s.*'ball' moves"):
         verify(problem, rows, load_robot(problem.manipulator))
+
+
+@pytest.mark.parametrize("n", [1, 7, 100])
+def test_coal_measures_what_moves_at_rows_all_over(n: int, tmp_path: Path) -> None:
+    """From the first row to the last, of every link; a ball beside a straight arm."""
+    still = "  - {name: post, shape: sphere, center: [0, 900, 0], radius: 50}\n"
+    lines = ball("[450, 0, 900]", "[450, 300, 200]") + still
+    problem = problem_of(tmp_path / "p.yaml", lines)
+    joints = np.zeros((n, 7))
+    joints[:, 0] = np.linspace(0.0, 0.4, n)
+    times = np.linspace(1.0, 3.0, n)
+    arm = CoalArm(load_robot(problem.manipulator), problem)
+    found = list(arm.spread(motion_of(joints, times)))
+    rows = sorted({int(k * (n - 1) / (SPREAD - 1)) for k in range(SPREAD)})
+    asked = [(row, link) for row in rows for link in range(3)]
+    row = np.concatenate([one.moment for one in found]).astype(int)
+    pair = np.concatenate([one.pair for one in found])
+    assert [*zip(row, arm.pairs.one[pair], strict=True)] == asked
+    assert {arm.pairs.named(k)[1] for k in pair} == {"ball"}
+    share = (times[row] - 1.0) / 2.0
+    centre = np.outer(1.0 - share, [0.45, 0.0, 0.9]) + np.outer(share, [0.45, 0.3, 0.2])
+    begin = joints[row, 0] + 0.3 * arm.pairs.one[pair]
+    along = np.clip(centre[:, 0], begin, begin + 0.3)
+    off = np.hypot(np.hypot(centre[:, 1], centre[:, 2]), centre[:, 0] - along)
+    distance = np.concatenate([one.distance for one in found])
+    np.testing.assert_allclose(distance, off - 0.09, atol=1e-9)
+    assert all((one.lower == -np.inf).all() for one in found)
+    assert all((one.upper == np.inf).all() for one in found)
