@@ -1,10 +1,19 @@
-"""How certificates round what planes prove."""
+"""How certificates round what planes prove, and tell what covers a mesh."""
 
 from fractions import Fraction
+from itertools import product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pytest
 
+from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.geometry.solids import BOX_CORNERS, Prism
+from vdsm_pin.verification.certificate_file import LinkPieces, Primitive
 from vdsm_pin.verification.certificate_lines import PER_METRE, _counted
+from vdsm_pin.verification.certificate_links import link_pieces
+from vdsm_pin.verification.certificate_writer import _triangles
 
 
 def test_claims_leave_the_checker_room_where_they_may() -> None:
@@ -21,3 +30,58 @@ def test_claims_leave_the_checker_room_where_they_may() -> None:
         if lower - required > 2.5 / PER_METRE:
             assert Fraction(lower) - claim >= Fraction(99, 100 * PER_METRE)
     assert _counted(2.2587605964, 0.0) == 22587605963
+
+
+def test_a_link_is_told_where_its_order_or_cover_is_not_that_of_its_file() -> None:
+    """Hulls by the triangles under them, primitives by one corner and its edges."""
+    rng = np.random.default_rng(3)
+    corners = BOX_CORNERS * [0.1, 0.2, 0.3] + [1.0, 2.0, 3.0]
+    ball, rod, box = (Hull(p, 0.5) for p in (corners[:1], corners[:2], corners))
+    groups = tuple(np.sort(part) for part in np.split(rng.permutation(9), [2, 5]))
+    pieces: Any = SimpleNamespace(
+        order=np.array([7, 0, 1, 2, 0, 2, 1, 0, 1]),
+        first_piece=np.array([0, 1, 4, 7, 9]),
+    )
+    links = [("plain", ()), ("sorted", ()), ("covered", (groups, ball, rod, box))]
+    found = dict(link_pieces(links, [1, 2, 3], pieces))
+    assert [*found] == ["sorted", "covered"]
+    assert found["sorted"] == LinkPieces(order=[0, 2, 1], meshes=[])
+    told = found["covered"]
+    assert told.order == []
+    hulls, *primitives = told.meshes
+    assert hulls == [
+        next(k for k, group in enumerate(groups) if i in group) for i in range(9)
+    ]
+    for primitive, hull in zip(primitives, (ball, rod, box), strict=True):
+        assert isinstance(primitive, Primitive) and primitive.radius_m == 0.5
+        edges = np.array(primitive.edges_m).reshape(-1, 3)
+        shares = np.array([*product((0, 1), repeat=len(edges))]).reshape(
+            2 ** len(edges), -1
+        )
+        made = primitive.origin_m + shares @ edges
+        for corner in hull.points:
+            assert np.linalg.norm(made - corner, axis=1).min() < 1e-12
+        assert len(made) == len(hull.points)
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_triangles_of_a_prism_run_as_its_polygon(turned: int) -> None:
+    """Each by the corners of the file, and of the same sense and area together."""
+    rng = np.random.default_rng(8)
+    for n in (3, 5, 9):
+        turns = np.sort(rng.uniform(0.0, 2.0 * np.pi, n))
+        turns[:3] += [0.0, 2.1, 4.2]
+        star = np.sort(turns % (2.0 * np.pi))
+        out = rng.uniform(0.3, 1.0, n)[:, None]
+        polygon = (out * np.column_stack([np.cos(star), np.sin(star)]))[::turned]
+        away = polygon + rng.uniform(-3.0, 3.0, 2)
+        prism = Prism("p", np.zeros(3), np.eye(3), away, (0.0, 1.0))
+        areas = [_area(prism.polygon[k]) for k in _triangles(prism)]
+        assert all(area * turned > 0.0 for area in areas)
+        assert sum(areas) == pytest.approx(_area(prism.polygon), rel=1e-9)
+
+
+def _area(corners: np.ndarray) -> float:
+    """Of a polygon, above 0 where it runs anticlockwise."""
+    x, y = corners.T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0

@@ -1,7 +1,8 @@
 """Refutation of error boxes: found where there is one, true wherever it is found."""
 
 from dataclasses import replace
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -9,14 +10,23 @@ import pytest
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Mesh, Sphere
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.arm_counterexamples import find_counterexamples
+from vdsm_pin.proof.layouts import AT_UPPER, BEST, OTHER, OWN, TIME, UP
+from vdsm_pin.proof.terms import REFUTED, UNDECIDED
+from vdsm_pin.verification import arm_counterexamples
+from vdsm_pin.verification.arm_counterexamples import (
+    MOST_MEETINGS,
+    find_counterexamples,
+    with_meetings,
+)
 from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.contacts import BESIDE, MEETING
 from vdsm_pin.verification.records import Counterexample, Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
@@ -220,3 +230,61 @@ def test_the_nominal_motion_is_called_clear_only_where_all_of_it_is_proved() -> 
         assert found.nominal_clear is clear
         row = next(c for c in found.checks if c.name == "clearance from obstacles")
         assert row.where.endswith("is clear") is clear
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every pair left open at 0 mm is asked about in turn; oracle: a plain loop."""
+    rng, n_rows, n = np.random.default_rng(seed), 6, 60
+    rows = motion(n_rows)
+    proof = prove_clearance(problem_with(ceiling(0.1)), rows, ErrorBox())
+    counts = rng.integers(0, 2, (n, 3)) * rng.integers(1, 4, (n, 3))
+    best = rng.uniform(-1.0, 1.0, (n, BEST))
+    best[:, UP] = rng.choice([0.5, 2.0, 0.0, -1.0], n) * MEETING
+    best[:, AT_UPPER] = rng.integers(0, n_rows - 1, n)
+    best[:, TIME] = rng.choice([0.0, 0.3, 1.0], n)
+    radii = {k: rng.choice([0.0, 0.25], len(BESIDE)) for k in range(n)}
+    asked = list[tuple[int, FloatArray, FloatArray]]()
+
+    def asked_of(problem: Any, trajectory: Any, k: int, errors: ErrorBox) -> Any:
+        assert errors == ErrorBox()
+        left = iter(radii[k].tolist())
+
+        def common_ball(q: float, middle: FloatArray) -> tuple[float, FloatArray]:
+            asked.append((k, np.array(q), middle))
+            return next(left), middle + q
+
+        return SimpleNamespace(rows=lambda moments: moments, common_ball=common_ball)
+
+    monkeypatch.setattr(arm_counterexamples, "erring_pair", asked_of)
+    given = replace(proof, pairs=tuple(range(n)), counts=counts, best=best)
+    told: Any = given
+    found = with_meetings(problem_with(), rows, replace(told, n_intervals=n_rows - 1))
+    wanted, rest = best.copy(), counts.copy()
+    expected = list[tuple[int, float]]()
+    met = 0
+    for k in range(n):
+        near = best[k, UP] <= MEETING
+        if not (counts[k, UNDECIDED] and not counts[k, REFUTED] and near):
+            continue
+        met += 1
+        if met > MOST_MEETINGS:
+            continue
+        middle = (best[k, OWN:OTHER] + best[k, OTHER:]) / 2.0
+        for off, radius in zip(BESIDE, radii[k], strict=True):
+            moment = best[k, AT_UPPER] + best[k, TIME] + off
+            moment = min(max(moment, 0.0), n_rows - 1.0)
+            expected.append((k, moment))
+            if radius:
+                interval = min(int(moment), n_rows - 2)
+                wanted[k, UP:OWN] = -radius, interval, moment - interval
+                wanted[k, OWN:] = [*(middle + moment)] * 2
+                rest[k, REFUTED] += 1
+                rest[k, UNDECIDED] -= 1
+                break
+    assert [(k, float(q)) for k, q, _ in asked] == expected
+    np.testing.assert_array_equal(found.counts, rest)
+    np.testing.assert_array_equal(found.best, wanted)
+    assert 0 < met and (rest != counts).any()

@@ -1,7 +1,9 @@
 """What planners are told of clearances, against what is proved of the same arms."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,13 +11,16 @@ import pytest
 import yaml
 
 from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW, UP
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.link_clearance import arithmetic_pad, link_clearance
 
 BODY = {"name": "camera", "link": 2, "shape": "box", "center": [0.2, 0.1, 0]}
 ARMS: dict[str, dict[str, Any]] = {
@@ -60,3 +65,26 @@ def test_each_link_is_as_near_as_is_proved(name: str, tmp_path: Path) -> None:
             assert nearest <= high + TOLERANCES.bracket_gap
             if name != "body":  # which counts as round about its link
                 assert nearest >= low - TOLERANCES.bracket_gap
+
+
+@pytest.mark.parametrize(
+    "name", ["points", "centre", "radius", "extent", "base", "arm", "beside"]
+)
+@pytest.mark.parametrize("largest", [90.0, 110.0, 3000.0])
+def test_rounding_grows_with_the_largest_length_there_is(
+    name: str, largest: float
+) -> None:
+    """Of the arm, of its rail, or of whatever pieces have."""
+    arm, none = built_in("hrm8"), np.zeros(0)
+    if name == "base":
+        arm = replace(arm, base_range=(-largest, 1.0))
+    elif name == "arm":
+        arm = replace(arm, link_lengths=np.full(8, largest / 8.0))
+    sizes = {"points": np.zeros((0, 3)), "centre": none, "radius": none, "extent": none}
+    if name in sizes:
+        sizes[name] = np.array([1.0, -largest, 2.0])
+    pieces: Any = SimpleNamespace(**sizes)
+    problem = PlanningProblem("p", arm, Scene(()), None, 0.0, np.eye(4))
+    share = max(1.0, largest / TOLERANCES.scene_extent)
+    beside = largest if name == "beside" else 0.0
+    assert arithmetic_pad(problem, pieces, beside) == share * TOLERANCES.arithmetic

@@ -33,10 +33,9 @@ def arithmetic_pad(
         beside: What joints that carry obstacles add up to; [m], [rad].
     """
     arm = problem.manipulator
-    largest = max(beside, arm.total_length, *np.abs(arm.base_range))
-    for values in (pieces.points, pieces.centre, pieces.radius, pieces.extent):
-        largest = max(largest, np.abs(values).max(initial=0.0))
-    return rounding_pad(float(largest))
+    values = pieces.points, pieces.centre, pieces.radius, pieces.extent
+    largest = [np.abs(one).max(initial=arm.total_length) for one in values]
+    return rounding_pad(float(max(beside, *largest, *np.abs(arm.base_range))))
 
 
 def link_clearance(problem: PlanningProblem) -> Callable[..., FloatArray]:
