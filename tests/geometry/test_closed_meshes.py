@@ -145,11 +145,15 @@ def test_a_corner_on_an_edge_is_joined_to_it(off: float) -> None:
     corners = box(5)
     a, b, c = corners[0]
     middle = 0.3 * a + 0.7 * b + off
-    found = close_mesh(
-        *Made(
-            np.concatenate([corners[1:], [[a, middle, c], [middle, b, c]]]), [], []
-        ).indexed()
-    )
+    seamed = np.concatenate([corners[1:], [[a, middle, c], [middle, b, c]]])
+    found = close_mesh(*Made(seamed, [], []).indexed())
+    # Where another face is turned round no seam makes up for it.
+    other = seamed.copy()
+    other[5] = other[5, ::-1]
+    mixed = close_mesh(*Made(other, [], []).indexed())
+    assert mixed.closed and mixed.single.all() and not mixed.signed.any()
+    assert len(mixed.single) == len(other) + 1
+    assert found.signed.all() and not found.single.any()
     assert found.closed
     assert len(found.beside) == 1
     assert found.gap <= off * np.sqrt(3.0)

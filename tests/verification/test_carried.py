@@ -21,9 +21,15 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.reason import reason
+from vdsm_pin.verification.approaches import _station
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
-from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.records import (
+    ClosestApproach,
+    Pair,
+    Verdict,
+    Verification,
+)
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
@@ -214,6 +220,33 @@ def test_the_feed_hits_what_is_behind_the_base(tmp_path: Path) -> None:
     rows = motion_in(tmp_path, sliding() * [[0.0], [1.0]] + 0.0)
     problem = problem_in(tmp_path, {"feed": {"length": 0.3}}, [behind])
     assert judged(problem, rows)[1].verdict is Verdict.CERTIFIED
+
+
+def test_a_witness_is_told_along_its_link_or_back_from_the_first_joint(
+    tmp_path: Path,
+) -> None:
+    """On the axis and beside it, past either end and between, at any moment."""
+    rng = np.random.default_rng(4)
+    joints = rng.uniform(-0.5, 0.5, (3, 7))
+    file = problem_in(tmp_path, {"feed": {"length": 0.3}}, [BALL])
+    problem = read_problem(file)
+    rows = read_trajectory(motion_in(tmp_path, joints), problem.manipulator)
+    for share in (0.0, 0.25, 1.0):
+        q = joints[1] + share * (joints[2] - joints[1])
+        centres = joint_centres(
+            problem.manipulator, q[:1], q[None, 1::2], q[None, 2::2]
+        )
+        ends = [centres[0, 0] - [0.3, 0.0, 0.0], *centres[0]]
+        for link, (begin, end) in enumerate(pairwise(ends)):
+            length = float(np.linalg.norm(end - begin))
+            for along in (-0.1, 0.0, 0.1, 0.99 * length, length + 0.2):
+                axis = (end - begin) / length
+                beside = np.cross(axis, [0.0, 0.0, 1.0])
+                point = begin + along * axis + 0.07 * beside
+                pair = Pair(link, "post", body="" if link else "feed")
+                near = ClosestApproach(1, share, pair, 0.1, 0.2, 0.0, point, point)
+                expected = np.clip(along, 0.0, length) - (0.0 if link else 0.3)
+                assert _station(problem, rows, near) == pytest.approx(expected)
 
 
 def test_pairs_are_left_out_by_name_and_unknown_names_refused(tmp_path: Path) -> None:
