@@ -20,7 +20,7 @@ from multiprocessing.queues import Queue
 from pathlib import Path
 from typing import Final
 
-from analysis.mutation.changes import Change, changes
+from analysis.mutation.changes import Change, changes, uses
 from analysis.mutation.coverage_map import PLAIN, Asked, CoverageMap, coverage_map
 from analysis.mutation.groups import GROUPS, ROOT, Group, modules_of
 from analysis.mutation.trial import Task, Trial, copy_checkout, try_changes
@@ -80,6 +80,17 @@ def _work(
         done.put(None)
 
 
+def effects(change: Change, modules: list[str]) -> dict[str, tuple[int, ...]]:
+    """Where a change has an effect, lines by module: what it names is imported."""
+    if not change.names:
+        return {change.module: change.lines}
+    origin = change.module.removesuffix(".py").replace("/", ".")
+    found = {m: uses(ROOT / m, origin, change.names) for m in modules}
+    return {m: lines for m, lines in found.items() if lines} | {
+        change.module: change.lines
+    }
+
+
 def _as_it_is(module: str) -> Change:
     """No change at all: its tests must pass in the copy, as they did for the map."""
     content = (ROOT / module).read_text(encoding="utf-8")
@@ -96,11 +107,11 @@ def tried(
         tasks = [
             Task(
                 one,
-                seen.asked(*place),
-                asked.budget * (1 if seen.runs(*place) or not one.line else WIDER),
+                seen.asked(places),
+                asked.budget * (1 if seen.runs(places) or not one.line else WIDER),
             )
             for one in [*[_as_it_is(mine[0].module)] * asked.jobs, *mine]
-            for place in [(one.module, one.lines)]
+            for places in [effects(one, list(seen.tests))]
         ]
         for trial in tried_at_once(tasks, PLAIN if plain else None, asked.jobs):
             if trial.change.line:

@@ -5,6 +5,7 @@ import copy
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -47,6 +48,7 @@ class Change:
         content: The module with the change.
         lines: Where it has an effect: its own, the first of its statement; of what
             runs at import alone, the lines that use the name it gives a value.
+        names: What it gives a value, where that runs at import.
         number: Which it is of those alike in its function, from 1.
     """
 
@@ -57,6 +59,7 @@ class Change:
     after: str
     content: str
     lines: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
     number: int = 1
 
     @property
@@ -166,7 +169,7 @@ def changes(root: Path, module: str) -> list[Change]:
     """
     source = (root / module).read_text(encoding="utf-8")
     tree = ast.parse(source)
-    effects = _effects(tree)
+    effects, names = _effects(tree), _names(tree)
     places = _Places()
     places.visit(tree)
     found = []
@@ -183,6 +186,7 @@ def changes(root: Path, module: str) -> list[Change]:
                     after=ast.unparse(ast.fix_missing_locations(changed)),
                     content=_with(source, node, changed),
                     lines=effects.get(id(node), (node.lineno,)),
+                    names=names.get(id(node), ()),
                 )
             )
     return _numbered(found)
@@ -198,6 +202,28 @@ def _numbered(found: list[Change]) -> list[Change]:
     return told
 
 
+def _names(tree: ast.Module) -> dict[int, tuple[str, ...]]:
+    """What each expression that runs at import gives a value, by the id of its node."""
+    found: dict[int, tuple[str, ...]] = {}
+    for statement in tree.body:
+        if isinstance(statement, ast.Assign | ast.AnnAssign):
+            names = tuple(n.id for n in ast.walk(statement) if isinstance(n, ast.Name)
+                          and isinstance(n.ctx, ast.Store))  # fmt: skip
+            found |= dict.fromkeys(map(id, ast.walk(statement)), names)
+    return found
+
+
+@lru_cache(maxsize=4096)
+def uses(path: Path, origin: str, names: tuple[str, ...]) -> tuple[int, ...]:
+    """Lines of a module that use names which it imports from another one."""
+    every = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    imported = {one.name for node in every if isinstance(node, ast.ImportFrom)
+                and node.module == origin for one in node.names}  # fmt: skip
+    wanted = imported.intersection(names)
+    used = (n for n in every if isinstance(n, ast.Name) and n.id in wanted)
+    return tuple(sorted({node.lineno for node in used}))
+
+
 def _effects(tree: ast.Module) -> dict[int, tuple[int, ...]]:
     """Lines where each expression has an effect, by the id of its node."""
     users: dict[str, list[int]] = {}
@@ -210,12 +236,8 @@ def _effects(tree: ast.Module) -> dict[int, tuple[int, ...]]:
             for node in ast.walk(statement):
                 if hasattr(node, "lineno"):
                     found[id(node)] = (node.lineno, statement.lineno)
-    for statement in tree.body:
-        if isinstance(statement, ast.Assign | ast.AnnAssign):
-            targets = [n.id for n in ast.walk(statement) if isinstance(n, ast.Name)
-                       and isinstance(n.ctx, ast.Store)]  # fmt: skip
-            lines = tuple(line for name in targets for line in users.get(name, []))
-            found |= dict.fromkeys(map(id, ast.walk(statement)), lines)
+    for node_id, names in _names(tree).items():
+        found[node_id] = tuple(line for name in names for line in users.get(name, []))
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef):
             within = range(function.body[0].lineno, (function.end_lineno or 0) + 1)

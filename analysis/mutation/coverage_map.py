@@ -35,13 +35,18 @@ class CoverageMap:
     tests: dict[str, dict[int, list[str]]]
     seconds: dict[str, float]
 
-    def runs(self, module: str, lines: tuple[int, ...]) -> bool:
-        """Whether some test runs one of the lines."""
-        by_line = self.tests.get(module, {})
-        return any(by_line.get(line) for line in lines)
+    def _of(self, places: dict[str, tuple[int, ...]]) -> set[str]:
+        """Tests that run one of the lines of some modules."""
+        none: list[str] = []
+        return {test for module, lines in places.items() for line in lines
+                for test in self.tests.get(module, {}).get(line, none)}  # fmt: skip
 
-    def asked(self, module: str, lines: tuple[int, ...]) -> dict[str, float]:
-        """Tests of lines with their seconds.
+    def runs(self, places: dict[str, tuple[int, ...]]) -> bool:
+        """Whether some test runs one of the lines of some modules."""
+        return bool(self._of(places))
+
+    def asked(self, places: dict[str, tuple[int, ...]]) -> dict[str, float]:
+        """Tests of lines of some modules with their seconds.
 
         The quickest of each file come first, since tests of one file notice the same,
         then all others, the quickest first: these hold functions to formulas.
@@ -49,9 +54,9 @@ class CoverageMap:
         Where no test runs any of the lines, all may be asked: what runs at import has
         an effect anywhere.
         """
-        by_line = self.tests.get(module, {})
-        known = set().union(*(by_line.get(line, []) for line in lines))
-        known = known or {name for name, used in self.seconds.items() if used < SLOW}
+        known = self._of(places) or {
+            name for name, used in self.seconds.items() if used < SLOW
+        }
         turns, rank = Counter[str](), {}
         for test in sorted(known, key=lambda name: (self.seconds[name], name)):
             file = test.partition("::")[0]

@@ -5,6 +5,7 @@ imported again. What runs at import (constants, defaults, class bodies) is writt
 copy of the checkout, and its tests run in a process of their own.
 """
 
+import ast
 import gc
 import importlib
 import math
@@ -111,15 +112,26 @@ def _at_import(code: CodeType) -> tuple[Any, ...]:
     return code.co_code, code.co_names, repr(consts)
 
 
-def new_code(module: Path, content: str) -> dict[tuple[str, int], CodeType] | None:
+def _called_at_import(source: str) -> set[str]:
+    """Names that a module calls outside of its functions and classes."""
+    kept = [s for s in ast.parse(source).body
+            if not isinstance(s, ast.FunctionDef | ast.ClassDef)]  # fmt: skip
+    calls = (n for s in kept for n in ast.walk(s) if isinstance(n, ast.Call))
+    return {one.func.id for one in calls if isinstance(one.func, ast.Name)}
+
+
+def new_code(module: Path, change: Change) -> dict[tuple[str, int], CodeType] | None:
     """The code of a changed module's functions by name and first line.
 
     Returns:
         None where something differs that runs at import.
     """
-    before = compile(module.read_text(encoding="utf-8"), str(module), "exec")
-    after = compile(content, str(module), "exec")
+    source = module.read_text(encoding="utf-8")
+    before = compile(source, str(module), "exec")
+    after = compile(change.content, str(module), "exec")
     if _at_import(before) != _at_import(after):
+        return None
+    if change.function.partition(".")[0] in _called_at_import(source):
         return None
     every = list(_within(after))
     found = {(code.co_qualname, code.co_firstlineno): code for code in every}
@@ -162,7 +174,7 @@ class Bench:
         if not change.line:
             return Trial(change, self._fail(task, items), len(task.tests), 0.0)
         module = self._folder / change.module
-        code = new_code(module, change.content)
+        code = new_code(module, change)
         if code is None:
             status = self._written(module, task)
         else:

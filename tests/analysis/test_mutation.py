@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from analysis.mutation.changes import Change, changes  # noqa: E402
+from analysis.mutation.changes import Change, changes, uses  # noqa: E402
 from analysis.mutation.coverage_map import Asked, CoverageMap, coverage_map  # noqa: E402
 from analysis.mutation.trial import Task  # noqa: E402
 
@@ -83,6 +83,13 @@ def test_what_runs_at_import_has_its_effect_where_its_name_is_used(
     (tmp_path / "module.py").write_text(module)
     lines = {one.before: one.lines for one in changes(tmp_path, "module.py")}
     assert lines["2"] == (5,)
+    names = {one.before: one.names for one in changes(tmp_path, "module.py")}
+    assert names.pop("2") == ("SIZE",)
+    assert not any(names.values())
+    other = tmp_path / "other.py"
+    other.write_text("from module import SIZE\n\nTWICE = 2 * SIZE\n")
+    assert uses(other, "module", ("SIZE",)) == (3,)
+    assert uses(other, "another", ("SIZE",)) == uses(other, "module", ("one",)) == ()
     assert lines["3"] == (5, 6, 7)
     assert lines["4"] == (7, 6)
 
@@ -95,15 +102,15 @@ def test_the_map_knows_which_test_runs_a_line(tmp_path: Path) -> None:
     asked, kept = Asked(tmp_path, ["module.py"], plain=False), tmp_path / "kept"
     kept.mkdir()
     seen = coverage_map(asked, ["test_one.py"], 1, kept)
-    assert list(seen.asked("module.py", (2,))) == ["test_one.py::test_one"]
+    assert list(seen.asked({"module.py": (2,)})) == ["test_one.py::test_one"]
     # No test runs line 3: what a module does at import, any test may see.
-    assert list(seen.asked("module.py", (3,))) == ["test_one.py::test_one"]
+    assert list(seen.asked({"module.py": (3,)})) == ["test_one.py::test_one"]
 
 
 def test_each_file_of_tests_is_asked_before_any_twice() -> None:
     seconds = {"a::1": 0.1, "a::2": 0.2, "b::1": 0.5, "b::2": 0.6, "a::3": 0.7}
     seen = CoverageMap({"module.py": {1: sorted(seconds)}}, seconds)
-    tests = seen.asked("module.py", (1,))
+    tests = seen.asked({"module.py": (1,)})
     assert list(tests) == ["a::1", "b::1", "a::2", "b::2", "a::3"]
     change = Change("module.py", 1, "", "", "", "")
     assert Task(change, tests, 0.6).asked() == ["a::1", "b::1"]
@@ -133,11 +140,12 @@ def test_a_change_that_matters_is_noticed_and_the_module_is_put_back(
     """Within functions and at import, the one as the other."""
     module = (
         "M = 3\n\ndef one(x, y=4):\n    if x < M:\n        return 0\n    return 5\n"
+        "\n\ndef made():\n    return 7\n\n\nN = made()\n"
     )
     (tmp_path / "module.py").write_text(module)
     (tmp_path / "test_one.py").write_text(
-        "from module import M, one\n\n"
-        "def test_one():\n    assert (one(0), M) == (0, 3)\n"
+        "from module import M, N, one\n\n"
+        "def test_one():\n    assert (one(0), M, N) == (0, 3, 7)\n"
     )
     subprocess.run([sys.executable, "-c", TRIED, str(tmp_path)], cwd=ROOT, check=True)
     said = set((tmp_path / "said").read_text().splitlines())
@@ -148,5 +156,6 @@ def test_a_change_that_matters_is_noticed_and_the_module_is_put_back(
         "x < M -> x <= M False",  # nobody asks about 3
         "0 -> 1 True",
         "5 -> 6 False",
+        "7 -> 8 True",  # called at import
     }
     assert (tmp_path / "module.py").read_text() == module

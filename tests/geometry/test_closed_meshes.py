@@ -18,7 +18,7 @@ from oracles.closed_solids import (
 from scipy.sparse.csgraph import connected_components
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.closed_meshes import close_mesh
+from vdsm_pin.geometry.closed_meshes import close_mesh, closed_parts
 from vdsm_pin.geometry.mesh_gaps import SLANT, clusters
 from vdsm_pin.geometry.winding import Location, Side, locate
 
@@ -153,6 +153,8 @@ def test_a_corner_on_an_edge_is_joined_to_it(off: float) -> None:
     mixed = close_mesh(*Made(other, [], []).indexed())
     assert mixed.closed and mixed.single.all() and not mixed.signed.any()
     assert len(mixed.single) == len(other) + 1
+    again = close_mesh(*Made(np.concatenate([other, other[7:8]]), [], []).indexed())
+    assert again.closed and again.single.sum() == len(other) + 1 and again.single[-1]
     assert found.signed.all() and not found.single.any()
     assert found.closed
     assert len(found.beside) == 1
@@ -268,3 +270,20 @@ def test_vertices_are_joined_along_chains_in_which_one_of_two_is_loose(
     least = [int(np.flatnonzero(part == one)[0]) for one in part]
     assert joined.tolist() == least
     assert 5 < len(set(least)) < 75
+
+
+def test_closed_parts_hang_together_by_their_corners() -> None:
+    """One within another, two that touch in a corner, some of their faces mixed."""
+    rng = np.random.default_rng(2)
+    boxes = [box(1.0), box(0.5), box(0.5, (1.5, 1.5, 1.5)), box(1.0, (9, 0, 0))]
+    order = rng.permutation(sum(map(len, boxes)))
+    corners = np.concatenate(boxes)[order]
+    truth = np.repeat([0, 1, 0, 2], [len(one) for one in boxes])[order]
+    found = closed_parts(corners)
+    assert found is not None
+    assert sorted(set(found.tolist())) == [0, 1, 2]
+    assert len({*zip(found.tolist(), truth.tolist(), strict=True)}) == 3
+    assert closed_parts(corners[1:]) is None
+    tube = trimesh.creation.annulus(0.5, 1.0, 20.0, sections=60)  # a long chain
+    parts = closed_parts(np.asarray(tube.triangles))
+    assert parts is not None and not parts.any()

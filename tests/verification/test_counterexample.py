@@ -18,16 +18,18 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import AT_UPPER, BEST, OTHER, OWN, TIME, UP
-from vdsm_pin.proof.terms import REFUTED, UNDECIDED
-from vdsm_pin.verification import arm_counterexamples
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
+from vdsm_pin.verification import arm_counterexamples, counterexample
 from vdsm_pin.verification.arm_counterexamples import (
     MOST_MEETINGS,
+    erring_pair,
     find_counterexamples,
     with_meetings,
 )
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.contacts import BESIDE, MEETING
-from vdsm_pin.verification.records import Counterexample, Verdict
+from vdsm_pin.verification.counterexample import ErringPair, Moment, Search
+from vdsm_pin.verification.records import Counterexample, Pair, Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.verify import verify
@@ -288,3 +290,46 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
     np.testing.assert_array_equal(found.counts, rest)
     np.testing.assert_array_equal(found.best, wanted)
     assert 0 < met and (rest != counts).any()
+
+
+@pytest.mark.parametrize("radius", [0.0, 1e-6, 0.05])
+@pytest.mark.parametrize("verdict", [CERTIFIED, REFUTED, UNDECIDED])
+@pytest.mark.parametrize("near", [True, False])
+def test_a_configuration_is_judged_by_its_proof_or_a_ball_in_both(
+    radius: float, verdict: int, near: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows, box = motion(4), ErrorBox(joint=0.01, base=0.003)
+    problem = problem_with(ceiling(0.1))
+    asked = erring_pair(problem, rows, Pair(5, "ceiling"), box)
+    search, limit = Search(asked), 0.002 + 0.003
+    assert search.limit == pytest.approx(limit) and asked.ball == ARM.link_radius
+    points = np.array([[1.0, 2, 3], [4, 6, 8]])
+    upper = np.nextafter(search.limit, 1.0) if not near else search.limit
+    balls, centre = list[FloatArray](), np.array([7.0, 8.0, 9.0])
+
+    def common_ball(_: Any, q: FloatArray, at: FloatArray) -> tuple[float, FloatArray]:
+        balls.append(at)
+        assert len(q) == 17
+        return radius, centre
+
+    told = SimpleNamespace(verdict=[verdict], upper=[upper], points=[points])
+    monkeypatch.setattr(counterexample, "answer", lambda *_: told)
+    monkeypatch.setattr(ErringPair, "common_ball", common_ball)
+    offset = np.linspace(-0.01, 0.01, 17)
+    offset[3] = -0.0
+    found = search._judged(Moment(2, 0.25), offset)
+    asks = verdict != REFUTED and near
+    assert [b.tolist() for b in balls] == ([[2.5, 4.0, 5.5]] if asks else [])
+    if not (verdict == REFUTED or (asks and radius)):
+        assert found is None
+        return
+    assert found is not None
+    depth, ends = (-radius, [centre, centre]) if asks else (upper, points)
+    assert found.clearance == pytest.approx(depth - 0.003)
+    assert (found.interval, found.share, found.required) == (2, 0.25, 0.002)
+    np.testing.assert_array_equal([found.link_point, found.other_point], ends)
+    q = rows.joints[2] + 0.25 * (rows.joints[3] - rows.joints[2])
+    np.testing.assert_allclose(found.joints, q + offset)
+    np.testing.assert_array_equal(found.offsets, offset)
+    assert not np.signbit(found.offsets[3])
+    assert found.deeper == (depth <= 1e-9 - ARM.link_radius)

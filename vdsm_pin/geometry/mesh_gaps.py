@@ -96,8 +96,7 @@ def seams_along(
     share, off = off_segment(
         vertices[corner], vertices[edges[edge, 0]], vertices[edges[edge, 1]]
     )
-    on = (share > 0.0) & (share < 1.0) & (off <= gap)
-    on &= (corner[:, None] != edges[edge]).all(axis=1)
+    on = (share > 0.0) & (share < 1.0) & (off <= gap)  # its own ends lie at 0 and 1
     edge, corner, share = edge[on], corner[on], share[on]
     order = np.lexsort((share, edge))
     edge, corner = edge[order], corner[order]

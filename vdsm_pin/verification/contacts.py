@@ -150,7 +150,7 @@ def _deepest(
     if one.inside is not None and other.inside is not None:
         return climb(one.inside, other.inside, np.array(point), enough, where), where
     flat, thick = (one, other.inside) if one.inside is None else (other, one.inside)
-    assert isinstance(flat.piece, Hull)  # all others have an inside
+    assert isinstance(flat.piece, Hull) and thick is not None  # all others have one
     return deepest_of(np.array(flat.piece.points), thick, where), where
 
 
