@@ -203,9 +203,17 @@ def _numbered(found: list[Change]) -> list[Change]:
 
 
 def _names(tree: ast.Module) -> dict[int, tuple[str, ...]]:
-    """What each expression that runs at import gives a value, by the id of its node."""
+    """What each expression that runs at import gives a value, by the id of its node.
+
+    Of a field's default it is the class.
+    """
     found: dict[int, tuple[str, ...]] = {}
     for statement in tree.body:
+        if isinstance(statement, ast.ClassDef):
+            for field in statement.body:
+                if isinstance(field, ast.Assign | ast.AnnAssign):
+                    nodes = map(id, ast.walk(field))
+                    found |= dict.fromkeys(nodes, (statement.name,))
         if isinstance(statement, ast.Assign | ast.AnnAssign):
             names = tuple(n.id for n in ast.walk(statement) if isinstance(n, ast.Name)
                           and isinstance(n.ctx, ast.Store))  # fmt: skip

@@ -86,6 +86,11 @@ def test_what_runs_at_import_has_its_effect_where_its_name_is_used(
     names = {one.before: one.names for one in changes(tmp_path, "module.py")}
     assert names.pop("2") == ("SIZE",)
     assert not any(names.values())
+    (tmp_path / "fields.py").write_text(
+        "class One:\n    x: int = 7\n\n\ndef one():\n    return One()\n"
+    )
+    (default,) = changes(tmp_path, "fields.py")
+    assert (default.names, default.lines) == (("One",), (6,))
     other = tmp_path / "other.py"
     other.write_text("from module import SIZE\n\nTWICE = 2 * SIZE\n")
     assert uses(other, "module", ("SIZE",)) == (3,)

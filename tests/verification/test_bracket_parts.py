@@ -28,16 +28,39 @@ from vdsm_pin.proof.layouts import (
 )
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import RANK
-from vdsm_pin.proof.terms import REFUTED
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
+from vdsm_pin.time_limit import Deadline
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import certificate_lines, coal_missing, proved_lowers
-from vdsm_pin.verification.brackets import ClearanceChunk, ClearanceProfile
+from vdsm_pin.verification.approaches import nearest_pairs
+from vdsm_pin.verification.brackets import (
+    ClearanceChunk,
+    ClearanceProfile,
+    LeastClearances,
+)
 from vdsm_pin.verification.clearance import _merged, _steps, profile_of
+from vdsm_pin.verification.clearance_check import (
+    LINKS,
+    OBSTACLES,
+    Evidence,
+    clearance_checks,
+)
 from vdsm_pin.verification.coal_arm import CoalDistances, _Moved
+from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_missing import NEAR
 from vdsm_pin.verification.coal_pairs import CoalPairs
-from vdsm_pin.verification.enclosed import EnclosedSink, enclosed_profile, pairs_inside
+from vdsm_pin.verification.enclosed import (
+    EnclosedSink,
+    Inside,
+    enclosed_checks,
+    enclosed_least,
+    enclosed_profile,
+    pairs_inside,
+)
+from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.moving import MOST_PARTS, PART, Knots, in_short_parts
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
+from vdsm_pin.verification.records import Check, Counterexample, Pair, Verdict
 from vdsm_pin.verification.task import all_pairs
 
 ARM = built_in("hrm8")
@@ -468,3 +491,179 @@ def test_what_nobody_would_read_is_refused(
             certificate_lines._check_size(proof)
     else:
         certificate_lines._check_size(proof)
+
+
+def random_least(rng: np.random.Generator, verdict: Any) -> LeastClearances:
+    """Brackets of pairs, some of them never bounded from above."""
+    n = len(verdict)
+    lower = rng.uniform(-0.1, 0.1, n)
+    upper = np.where(rng.random(n) < 0.3, np.inf, lower + rng.uniform(0.0, 0.05, n))
+    upper = np.where(verdict == REFUTED, lower + 0.01, upper)
+    points = rng.normal(size=(2, n, 3))
+    return LeastClearances(
+        rng.integers(0, 9, n), rng.random(n), lower, upper, verdict, *points
+    )
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_row_of_clearance_is_its_worst_pair(late: bool) -> None:
+    """Refuted before undecided before certified; of each kind of pair by itself."""
+    rng, seen = np.random.default_rng(int(late)), set()
+    asked = replace(problem(), required_clearance=0.03, required_self_clearance=0.04)
+    for _ in range(60):
+        n = int(rng.integers(1, 5))
+        pairs = tuple(
+            Pair(k + 1, "a") if rng.integers(2) else Pair(k + 1, other_link=k + 3)
+            for k in range(n)
+        )
+        verdict = rng.choice([CERTIFIED, REFUTED, UNDECIDED], n, p=[0.6, 0.2, 0.2])
+        least = random_least(rng, verdict)
+        counts = np.zeros((n, 3), np.int64)
+        counts[:, CERTIFIED] = rng.integers(0, 5, n)
+        counts[np.arange(n), verdict] += rng.integers(1, 5, n)
+        evidence = Evidence(
+            pairs, least, counts, lambda k, worst: worst < -0.001 * k, (), False, ()
+        )
+        rows = clearance_checks(asked, evidence, Deadline(3.0) if late else None)
+        expected = []
+        for name, limit, kind in ((OBSTACLES, 0.03, True), (LINKS, 0.04, False)):
+            mine = [k for k in range(n) if bool(pairs[k].obstacle) is kind]
+            if mine:
+                expected.append((name, limit, mine))
+        assert [row.name for row in rows] == [name for name, _, _ in expected]
+        for row, (_, limit, mine) in zip(rows, expected, strict=True):
+            found, values = Verdict.CERTIFIED, {k: least.lower[k] for k in mine}
+            if any(verdict[k] == REFUTED for k in mine):
+                found = Verdict.REFUTED
+                values = {k: least.upper[k] for k in mine if verdict[k] == REFUTED}
+            elif any(verdict[k] == UNDECIDED for k in mine):
+                found = Verdict.UNDECIDED
+            seen.add(found)
+            k = min(values, key=lambda one: values[one])
+            words = str(pairs[k])
+            if found is Verdict.UNDECIDED:
+                open_ = counts[mine, UNDECIDED].sum()
+                words += f"; {open_} of {counts[mine].sum()} undecided"
+            assert row.where.startswith(words)
+            told = late and found is Verdict.UNDECIDED
+            assert (row.where != words) == told and ("time" in row.where) == told
+            assert (row.verdict, row.worst, row.limit) == (found, values[k], limit)
+            assert row.count == counts[mine].sum()
+            moment = least.interval[k] + least.share[k]
+            known = np.isfinite(least.upper[k])
+            assert row.moment == moment if known else np.isnan(row.moment)
+            assert row.deeper == (values[k] < -0.001 * k)
+    assert len(seen) == 3
+
+
+def test_contacts_and_counterexamples_stand_in_the_row_of_their_kind() -> None:
+    pairs = (Pair(2, "a"), Pair(1, other_link=4))
+    least = random_least(np.random.default_rng(3), np.array([REFUTED, UNDECIDED]))
+    counts = np.array([[3, 2, 0], [4, 0, 1]])
+    first = FirstContact(pairs[0], 2.5, True, last=7.25, intervals=5, stretches=2,
+                         time=1.0, last_time=4.5)  # fmt: skip
+    alone = FirstContact(pairs[1], 1.0, False, last=1.0, intervals=1, stretches=1)
+    unknown = FirstContact(pairs[1], 1.125, True)
+    point = np.zeros(3)
+    found = Counterexample(
+        3, 0.5, pairs[1], point, point, -0.02, 0.0, point, point, deeper=True
+    )
+
+    def rows(contacts: Any, examples: Any = (), nominal: bool = False) -> Any:
+        told = Evidence(
+            pairs, least, counts, lambda *_: False, examples, nominal, contacts
+        )
+        return clearance_checks(problem(), told)
+
+    near, links = rows((first, alone))
+    assert near.where == (
+        "link 2 and a; first too close at waypoint 2.5 (1.0000 s): link 2 and a; "
+        "last at waypoint 7.25 (4.5000 s); 5 intervals in 2 stretches"
+    )
+    assert (near.first_moment, near.last_moment) == (2.5, 7.25)
+    assert (near.too_close_intervals, near.too_close_stretches) == (5, 2)
+    assert links.where == (
+        "link 1 and link 4; 1 of 5 undecided; first found too close at waypoint 1: "
+        "link 1 and link 4; last at waypoint 1; 1 interval"
+    )
+    _, links = rows((unknown,))
+    assert links.where.endswith("first too close at waypoint 1.125: link 1 and link 4")
+    for nominal, words in ((True, "; the nominal motion is clear"), (False, "")):
+        near, links = rows((), (found,), nominal)
+        assert near.verdict is links.verdict is Verdict.REFUTED
+        assert (links.worst, links.moment, links.deeper) == (-0.02, 3.5, True)
+        assert near.where == "link 2 and a" and near.worst == least.upper[0]
+        assert (
+            links.where == f"link 1 and link 4, with errors within the error box{words}"
+        )
+
+
+def test_pairs_that_come_nearest_are_listed_obstacles_first() -> None:
+    rng = np.random.default_rng(9)
+    for n in (0, 1, 8, 30):
+        pairs = tuple(
+            Pair(1, f"o{k}") if rng.integers(2) else Pair(1, other_link=k + 3)
+            for k in range(n)
+        )
+        least = random_least(rng, rng.integers(0, 3, n))
+        found = nearest_pairs(pairs, least)
+        known = [k for k in range(n) if np.isfinite(least.upper[k])]
+        known.sort(key=lambda k: (not pairs[k].obstacle, least.upper[k]))
+        assert [*found] == known[:10]
+        for k, one in found.items():
+            assert one.pair is pairs[k]
+            assert one.moment == least.interval[k] + least.share[k]
+            assert (one.lower, one.upper) == (least.lower[k], least.upper[k])
+            assert (one.link_point == least.link_point[k]).all()
+            assert (one.other_point == least.other_point[k]).all()
+
+
+def test_evidence_of_coal_is_its_largest_disagreement() -> None:
+    evidence, limit = CoalEvidence(), TOLERANCES.coal_agreement
+    none = evidence.check()
+    assert (none.count, none.verdict) == (0, Verdict.UNDECIDED)
+    assert np.isnan(none.worst) and np.isnan(none.moment)
+    for count, excess in enumerate((0.5, 0.25, 1.0, 1.0, 1.5, 0.0), start=1):
+        evidence.count = count
+        evidence.add(excess * limit, f"pair {count}", float(count))
+        most = (1, 1, 3, 3, 5, 5)[count - 1]  # the first of equals
+        row = evidence.check("; so many")
+        assert row.worst == (0.5, 0.5, 1.0, 1.0, 1.5, 1.5)[count - 1] * limit
+        assert (row.where, row.moment) == (f"pair {most}; so many", float(most))
+        agreed = row.worst <= limit
+        assert row.verdict is (Verdict.CERTIFIED if agreed else Verdict.UNDECIDED)
+        assert (row.count, row.limit) == (count, limit)
+
+
+def test_what_begins_inside_is_refuted_from_the_beginning() -> None:
+    rng, point = np.random.default_rng(5), np.array([1.0, 2.0, 3.0])
+    least = random_least(rng, rng.integers(0, 3, 6))
+    inside = {2: Inside(point, -0.04), 5: Inside(-point, -0.03)}
+    assert enclosed_least(least, {}) is least
+    found = enclosed_least(least, inside)
+    for field in fields(LeastClearances):
+        before, after = getattr(least, field.name), getattr(found, field.name)
+        assert not after.flags.writeable
+        np.testing.assert_array_equal(np.delete(after, [2, 5], 0), np.delete(
+            before, [2, 5], 0))  # fmt: skip
+    for k, one in inside.items():
+        assert (found.interval[k], found.share[k]) == (0, 0.0)
+        assert found.lower[k] == found.upper[k] == one.clearance
+        assert found.verdict[k] == REFUTED
+        assert (found.link_point[k] == one.point).all()
+        assert (found.other_point[k] == one.point).all()
+    rows = (
+        Check(
+            "a", Verdict.CERTIFIED, 7, 0.5, 0.1, "m", "x", 3.0, False, 2.0, 4.0, 5, 6
+        ),
+        Check("b", Verdict.UNDECIDED, 7, 0.5, 0.1, "m"),
+    )
+    assert enclosed_checks(rows, (), ()) is rows
+    for worst, depths in ((-0.04, [-0.03, -0.04]), (0.5, [])):
+        refuted, other = enclosed_checks(rows, ("hall", "room"), depths)
+        assert other is rows[1] and refuted.worst == worst
+        assert refuted.where == "the arm is inside 'hall'; the arm is inside 'room'"
+        assert (refuted.verdict, refuted.count) == (Verdict.REFUTED, 7)
+        assert refuted.moment == refuted.first_moment == 0.0
+        assert np.isnan(refuted.last_moment) and refuted.deeper is True
+        assert refuted.too_close_intervals == refuted.too_close_stretches == 0

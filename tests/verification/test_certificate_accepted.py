@@ -61,7 +61,8 @@ def test_lines_are_the_same_in_parts_and_none_is_too_long(
     case = random_case(np.random.default_rng(5), tmp_path, [SHAPES[1], SHAPES[2]])
     whole, parts, none = (tmp_path / name for name in ("whole", "parts", "none"))
     written(case, whole)
-    monkeypatch.setattr(lines_module, "PAIRS", 3)
+    for name in ("PAIRS", "ROOM"):
+        monkeypatch.setattr(lines_module, name, 3)
     written(case, parts)
     assert parts.read_bytes() == whole.read_bytes()
     clearances = sum(len(line["proofs"]) for line in certificate_lines(whole)[1:-1])

@@ -3,14 +3,23 @@
 from fractions import Fraction
 from itertools import product
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
+from pydantic import BaseModel, ValidationError
 
+from vdsm_pin.certificate_checker.program import VERSION
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.solids import BOX_CORNERS, Prism
-from vdsm_pin.verification.certificate_file import LinkPieces, Primitive
+from vdsm_pin.verification.certificate_file import (
+    ErrorLimits,
+    HeaderLine,
+    IntervalLine,
+    LastLine,
+    LinkPieces,
+    Primitive,
+)
 from vdsm_pin.verification.certificate_lines import PER_METRE, _counted
 from vdsm_pin.verification.certificate_links import link_pieces
 from vdsm_pin.verification.certificate_writer import _triangles
@@ -85,3 +94,58 @@ def _area(corners: np.ndarray) -> float:
     """Of a polygon, above 0 where it runs anticlockwise."""
     x, y = corners.T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
+
+
+PLANE = [0, 1, 1.0, 0.0, -1.0, 5]
+ERRORS = {"base": [0.0, 0.0], "obstacles": {"post": [0.0, 0.5]}, "joints_rad": [0.0]}
+
+
+@pytest.mark.parametrize(
+    ("model", "good", "bad"),
+    [
+        (
+            IntervalLine,
+            [
+                {"k": 0, "proofs": []},
+                {"k": 3, "proofs": [[[0.0, 0.5, [PLANE]], [0.5, 1, [PLANE, PLANE]]]]},
+                {"k": 0, "proofs": [[[0, 1, [[0, 1, -1.0, 0.0, 0.5, 0.25]]]]]},
+            ],
+            [
+                {"k": -1, "proofs": []},
+                {"k": 0, "proofs": [[]]},
+                {"k": 0, "proofs": [[[0.0, 1.0, []]]]},
+                {"k": 0, "proofs": [[[-1e-9, 1.0, [PLANE]]]]},
+                {"k": 0, "proofs": [[[0.0, 1.0 + 1e-9, [PLANE]]]]},
+                {"k": 0, "proofs": [[[0.0, 1.0, [[-1, *PLANE[1:]]]]]]},
+                {"k": 0, "proofs": [[[0.0, 1.0, [[*PLANE[:5], float("nan")]]]]]},
+                {"k": 0, "proofs": [], "more": 1},
+            ],
+        ),
+        (
+            ErrorLimits,
+            [ERRORS],
+            [ERRORS | {"base": [0.0, -1e-9]}, ERRORS | {"joints_rad": [-1e-9]}],
+        ),
+        (
+            LastLine,
+            [{"end": True, "sha256": 32 * "0f"}],
+            [{"end": False, "sha256": 32 * "0f"}, {"end": True, "sha256": 31 * "0f"}],
+        ),
+    ],
+)
+def test_lines_hold_what_their_limits_allow(
+    model: type[BaseModel], good: list[Any], bad: list[Any]
+) -> None:
+    for data in good:
+        line = model.model_validate(data)
+        with pytest.raises(ValidationError, match="frozen"):
+            setattr(line, next(iter(data)), None)
+    for data in bad:
+        with pytest.raises(ValidationError):
+            model.model_validate(data)
+
+
+def test_a_header_is_of_the_version_that_the_checker_reads() -> None:
+    version = HeaderLine.model_fields["vdsm_certificate"]
+    (read,) = get_args(version.annotation)
+    assert version.default == read == VERSION

@@ -13,7 +13,7 @@ from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Mesh, Sphere
 from vdsm_pin.problem.desired_path import DesiredPath
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
@@ -28,7 +28,16 @@ from vdsm_pin.verification.arm_counterexamples import (
 )
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.contacts import BESIDE, MEETING
-from vdsm_pin.verification.counterexample import ErringPair, Moment, Search
+from vdsm_pin.verification.counterexample import (
+    GRID,
+    GRIDS,
+    PARTS,
+    ErringPair,
+    Moment,
+    Search,
+    grown_by,
+    moments_of,
+)
 from vdsm_pin.verification.records import Counterexample, Pair, Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
@@ -333,3 +342,85 @@ def test_a_configuration_is_judged_by_its_proof_or_a_ball_in_both(
     np.testing.assert_array_equal(found.offsets, offset)
     assert not np.signbit(found.offsets[3])
     assert found.deeper == (depth <= 1e-9 - ARM.link_radius)
+
+
+def search_among(gaps: Any, **asked: Any) -> Any:
+    """A search whose clearances are those of a function of rows and its slopes."""
+    search: Any = object.__new__(Search)
+    search._slopes, search.asked = gaps, SimpleNamespace(**asked)
+    return search
+
+
+def test_slopes_lead_to_the_corner_of_the_box_that_is_nearest() -> None:
+    """Of a clearance that changes evenly; what it does not depend on stays."""
+    rng = np.random.default_rng(1)
+    for _ in range(30):
+        slope = rng.normal(size=6) * (rng.random(6) < 0.7)
+        scale, q = rng.uniform(0.1, 1.0, 6), rng.normal(size=(4, 6))
+
+        def gaps(q: FloatArray, slope: FloatArray = slope) -> Any:
+            return q @ slope, np.tile(slope, (len(q), 1))
+
+        search = search_among(gaps, sizes=scale)
+        begun = scale * rng.choice([-1.0, 0.0, 1.0], (4, 6))
+        expected = np.where(slope == 0.0, begun, -np.sign(slope) * scale)
+        least = ((expected - begun) @ slope)[:, None]
+        expected = np.where(least < 0.0, expected, begun)
+        np.testing.assert_array_equal(search._walk(q, begun, scale), expected)
+
+
+def test_walks_begin_at_corners_that_turn_every_second_joint() -> None:
+    search = search_among(None, sizes=np.ones(5))
+    assert search._first_corners().tolist() == [
+        [0, 0, 0, 0, 0], [0, 1, 0, 1, 0], [0, -1, 0, -1, 0], [1, 0, 1, 0, 1],
+        [-1, 0, -1, 0, -1],
+    ]  # fmt: skip
+    begun = moments_of(Moment(7, 0.3), 4)
+    assert begun == (Moment(7, 0.3), *(Moment(4, k / 8.0) for k in range(9)))
+
+
+@pytest.mark.parametrize("target", [0.53, 0.0, 0.5, 0.97, 1.0, 1.2, -0.1])
+def test_the_nearest_moment_of_the_interval_is_found(target: float) -> None:
+    """Within what an eighth of it is cut into; never outside of the interval."""
+    offset = np.array([0.25, -0.5])
+
+    def gaps(q: FloatArray) -> Any:
+        np.testing.assert_allclose(q[:, 1], q[:, 0] - 0.75, rtol=0, atol=1e-12)
+        return np.abs(q[:, 0] - 0.25 - 3.0 - target), None
+
+    search = search_among(gaps, rows=lambda m: np.stack([m, m], axis=1))
+    for off in (-0.12, 0.0, 0.12):
+        share = min(max(target, 0.0), 1.0) + off
+        begun = Moment(3, min(max(share, 0.0), 1.0))
+        found, kept = search._settle(begun, offset)
+        near = np.clip(target, 0.0, 1.0)
+        assert found.interval == 3 and kept is offset
+        assert abs(found.share - near) <= 0.125 / GRID**GRIDS
+        assert 0.0 <= found.share <= 1.0
+
+
+@pytest.mark.parametrize("limit", [0.5, 0.25, 1.0, 0.0, -1.0])
+def test_the_smallest_offset_is_just_beyond_what_keeps_the_clearance(
+    limit: float,
+) -> None:
+    """Of a clearance of 1 less the share, to the second fineness."""
+    search = search_among(lambda q: (1.0 - q[:, 0] + 5.0, None))
+    search.limit, offset = limit, np.array([1.0, -2.0])
+    search._nearest = lambda _: (Moment(1, 0.5), offset)
+    search._joints = lambda moment: np.array([5.0, 0.0])
+    search._judged = lambda moment, part: (moment, part)
+    found = search.smallest(())
+    if limit <= 0.0:
+        assert found is None
+        return
+    moment, part = found
+    assert moment == Moment(1, 0.5)
+    share = part[0]
+    assert part.tolist() == [share, -2.0 * share]
+    assert 1.0 - limit < share <= 1.0 - limit + 1.0 / (PARTS - 1) ** 2
+
+
+def test_what_stands_nearer_by_its_error_is_met_sooner() -> None:
+    errors = ErrorBox(base=0.25, obstacles=(ObstacleError("post", 0.5, 0.0),))
+    assert grown_by(errors, Pair(1, "post")) == 0.75
+    assert grown_by(errors, Pair(1, other_link=3)) == 0.0

@@ -55,6 +55,13 @@ def test_each_link_is_as_near_as_is_proved(name: str, tmp_path: Path) -> None:
         row = Trajectory(np.zeros(1, bool), none, none, alpha, theta)
         proof = prove_clearance(problem, row, ErrorBox())
         centres = joint_centres(problem.manipulator, row.x0, alpha, theta)
+        each = [told(centres[:, k : k + 2], k)[0, 0] for k in range(3)]
+        count = 2 if "tool" in name else 3  # which the last link includes
+        twice = told(np.repeat(centres, 2, axis=0), np.arange(3))
+        assert twice.shape == (2, 3)
+        for pieces in (each, *twice):
+            same = pytest.approx(told(centres)[0, :count], abs=TOLERANCES.bracket_gap)
+            assert pieces[:count] == same
         for link, nearest in enumerate(told(centres)[0], start=1):
             mine = [k for k, pair in enumerate(proof.pairs)
                     if pair.obstacle and pair.link == link]  # fmt: skip

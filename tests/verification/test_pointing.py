@@ -282,3 +282,21 @@ def test_a_bound_beyond_the_cone_is_never_green(
         (row,) = judging.check_pointing(tight, told, errors=box)
         assert row.verdict is Verdict.UNDECIDED
     assert count
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+@pytest.mark.parametrize("angle", [0.3, 1.2])
+def test_a_cone_is_kept_to_the_tolerance_of_angles(angle: float, rows: int) -> None:
+    """Of an arm that stands still, on both sides of it."""
+    tip = np.array([ARM.total_length, 0.0, 0.0])
+    look = np.array([[np.cos(angle), np.sin(angle), 0.0]])
+    on, none, still = np.ones(rows, bool), np.zeros(rows), np.zeros((rows, ARM.n_links))
+    rest = Trajectory(on, none, none, still, still)
+    for share, verdict in ((-0.5, "certified"), (0.5, "certified"), (1.5, "refuted")):
+        cone = angle - share * TOLERANCES.joint_limit
+        path = DesiredPath(tip, tip[None], pointing=Pointing(cone, directions=look))
+        problem = PlanningProblem("p", ARM, Scene(()), path, 0.0, np.eye(4))
+        row = the_row(problem, rest)
+        assert row.verdict.value == verdict
+        assert row.worst == pytest.approx(angle, abs=1e-11)
+        assert (row.count, row.moment, row.limit) == (1, 0.0, cone)
