@@ -149,7 +149,7 @@ class Scene:
                 raise InvalidInput(message)
             seen.add(name)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names in file order."""
         return tuple(obstacle.name for obstacle in self.obstacles)

@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -147,9 +148,10 @@ class ClearanceCsv:
 
 def _clearance_form(pairs: Sequence[Pair]) -> Form:
     """How rows of clearance.csv are written, whose words are verdicts and pairs."""
+    field = cache(quoted)  # few names, and up to a million pairs of them
     partners = (
-        f"{quoted(pair.body or str(pair.link))},{quoted(pair.obstacle)},"
-        f"{quoted(pair.other_body or str(pair.other_link or ''))}"
+        f"{field(pair.body or str(pair.link))},{field(pair.obstacle)},"
+        f"{field(pair.other_body or str(pair.other_link or ''))}"
         for pair in pairs
     )
     words = (*_VERDICTS, *partners)
