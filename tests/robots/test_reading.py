@@ -1,9 +1,12 @@
 """What a robot is read as: groups, bases, limits, covers; Pinocchio agrees."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.certificate_cases import write_cube
+from oracles.random_robots import MESH
 
 from tests.robots.test_robots import URDF, mutated, write
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
@@ -219,6 +222,18 @@ def test_a_capsule_is_its_closed_form(tmp_path: Path) -> None:
     assert high - low < 1e-8
 
 
+def test_a_mesh_is_beside_the_urdf_or_in_a_package_dir(tmp_path: Path) -> None:
+    text, more = URDF.replace('sphere radius="0.1"', f'mesh filename="{MESH}"'), "more"
+    files = RobotFiles(write(tmp_path, "two.urdf", text), package_dirs=(more,))
+    with pytest.raises(InvalidFile, match=f"{MESH!r} is not found; say where with"):
+        read_robot(files)
+    (tmp_path / more).mkdir()
+    files = replace(files, package_dirs=(tmp_path / more,))
+    for folder in (tmp_path / more, tmp_path):  # the URDF's own folder is the first
+        write_cube(folder / MESH, 0.1)
+        assert folder / MESH in read_robot(files).more_files
+
+
 def test_xacro_is_expanded(tmp_path: Path) -> None:
     pytest.importorskip("xacrodoc")
     head = '<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">'
@@ -228,6 +243,8 @@ def test_xacro_is_expanded(tmp_path: Path) -> None:
     plain = read_robot(RobotFiles(write(tmp_path, "two.urdf", URDF)))
     q = np.array([[0.3, 0.1]])
     np.testing.assert_array_equal(robot.tree.poses(q), plain.tree.poses(q))
+    with pytest.raises(InvalidFile, match=r"macros\.xacro: .*it is of macros alone"):
+        read_robot(RobotFiles(write(tmp_path, "macros.xacro", f"{head}</robot>")))
     for bad in (text.replace("0.05 *", "length *"), text[:300]):
         with pytest.raises(InvalidFile, match="is not expanded by xacrodoc"):
             read_robot(RobotFiles(write(tmp_path, "two.urdf.xacro", bad)))

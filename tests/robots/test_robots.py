@@ -385,6 +385,7 @@ BAD = [
     ('joint="slide"', 'joint="follow"', "is no joint of one value or mimics it"),
     ('multiplier="2"', 'multiplier="x"', "expected a finite number"),
     ('<sphere radius="0.1"/>', '<mesh filename="a.stl"/>', "is not found"),
+    ('<sphere radius="0.1"/>', '<mesh filename="$(arg d)/a"/>', "expected no $( )"),
     ('<axis xyz="0 0 2"/>', '<axis xyz="0 0 0"/>', "is no direction"),
     ("<collision>", "<nothing>", "not XML"),
 ]

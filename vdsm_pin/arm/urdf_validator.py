@@ -86,7 +86,10 @@ def _problems(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
 def _tree_problems(robot: ET.Element) -> Iterator[str]:
     links = {link.get("name", "") for link in robot.findall("link")}
     if not links:
-        yield "has no link; a xacro file must end in .xacro"
+        yield (
+            "has no link: it is of macros alone, or a xacro file that does not end in "
+            ".xacro"
+        )
         return
     parent_of: dict[str, str] = {}
     for joint in robot.findall("joint"):

@@ -87,13 +87,14 @@ def find_mesh(name: str, urdf: Path, package_dirs: tuple[Path, ...]) -> Path | N
     """The file of a mesh that a URDF names; None where there is none.
 
     Args:
-        name: As the URDF has it: beside it, or `package://NAME/REST`.
+        name: As the URDF has it: from its folder, or `package://NAME/REST`.
         urdf: The URDF.
-        package_dirs: Where packages are looked for first.
+        package_dirs: Where packages are looked for first, other names after its folder.
     """
     beside = urdf.resolve().parent
     if not name.startswith(("package://", "model://")):
-        places = [beside / name.removeprefix("file://")]
+        plain = name.removeprefix("file://")
+        places = [folder / plain for folder in (beside, *package_dirs)]
     else:
         inner = Path(name.split("://", 1)[1])
         rest = Path(*inner.parts[1:])
@@ -117,7 +118,8 @@ class RobotFiles:
         srdf: Its SRDF, for the pairs of links that are not held apart, its groups and a
             planar or floating base; None: neighbours are not held apart.
         package_dirs: Where `package://NAME/REST` is looked for, as NAME/REST or REST;
-            then beside the URDF and above it.
+            then beside the URDF and above it. Other names are looked for beside it
+            first, then there.
         lock: Values of joints that stand still; [rad] or [m].
         group: Of the SRDF: its joints alone move, others stand where `lock` says or
             at 0. None: all move that are not locked.

@@ -136,7 +136,10 @@ class LinkReader:
     def _found(self, link: str, name: str) -> Path:
         """The file of a mesh."""
         if (found := find_mesh(name, self.path, self.package_dirs)) is None:
-            problem = f"mesh {name!r} is not found; say where with --package-dir"
+            how = "say where with --package-dir"
+            if "$(" in name:
+                how = "expected no $( ), but in xacro files, which end in .xacro"
+            problem = f"mesh {name!r} is not found; {how}"
             raise self._invalid(link, problem)
         return found
 
