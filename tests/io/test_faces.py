@@ -199,3 +199,12 @@ def test_a_face_of_ten_thousand_corners_is_cut() -> None:
     points = embedded(polygon, rng)
     area = areas(points, cut(points)).sum()
     assert area == pytest.approx(shapely.Polygon(polygon).area, rel=1e-9)
+
+
+@pytest.mark.parametrize("shift", range(4))
+def test_a_triangle_with_a_corner_given_twice_is_one(shift: int) -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 2, 0]])
+    rolled = np.roll(points, shift, axis=0)
+    triangles = cut(rolled)
+    assert len(triangles) == 1
+    assert areas(rolled, triangles).tolist() == [1.0]

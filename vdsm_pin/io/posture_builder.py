@@ -102,7 +102,7 @@ class PostureBuilder(Reading):
         angles = {
             "link angle psi": (np.arctan2(away, along), self.arm.max_link_angle),
             "yaw alpha": (np.arctan2(start[1], along), self.arm.max_joint_angle),
-            "pitch theta": (np.arcsin(-start[2] / length), self.arm.max_joint_angle),
+            "pitch theta": (np.arcsin(start[2] / length), self.arm.max_joint_angle),
         }
         for name, (angle, limit) in angles.items():
             if not abs(angle) <= limit + TOLERANCES.joint_limit:
