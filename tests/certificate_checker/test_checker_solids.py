@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.certificate_checker.balls import Rejected
-from vdsm_pin.certificate_checker.solids import Solid, away, boundary, hulls
+from vdsm_pin.certificate_checker.solids import Solid, away, boundary, hulls, sizes
+from vdsm_pin.geometry.solids import Mesh, PointCloud, Sphere
 
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
 
@@ -130,3 +132,15 @@ def test_hulls_of_closed_meshes_share_a_point_where_they_share_a_corner(
     for points, group, middle in zip(found, groups, middles, strict=True):
         expected = np.unique([*corners[group].reshape(-1, 3), middle], axis=0)
         np.testing.assert_allclose(points, expected, rtol=0, atol=1e-12)
+
+
+def test_sizes_that_nobody_states_are_told_of_all_that_stands_in_files() -> None:
+    """Of clouds and of what a link carries as of meshes."""
+    mesh = Mesh("part", np.eye(3), np.array([[0, 1, 2]]), assumed_size="9 x 9 x 9 m")
+    scan = PointCloud("scan", np.eye(3), 0.1, assumed_size="1 x 1 x 1 mm")
+    stated = Mesh("stated", np.eye(3), np.array([[0, 1, 2]]))
+    ball = Sphere("ball", np.zeros(3), 1.0)
+    assert sizes([scan, stated, ball, LinkBody(1, mesh)]) == [
+        "scan is taken to be 1 x 1 x 1 mm; no unit is stated",
+        "part is taken to be 9 x 9 x 9 m; no unit is stated",
+    ]

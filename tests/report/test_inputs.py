@@ -7,6 +7,7 @@ import made_up
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.facts import batch_row, verification_file
@@ -16,8 +17,8 @@ from vdsm_pin.report.terminal import show_verification
 from vdsm_pin.verification.records import Verification
 
 
-def judged(assumed: str, *notes: str) -> Verification:
-    """A verification with a mesh for its last obstacle."""
+def judged(assumed: str, *notes: str, carried: bool = False) -> Verification:
+    """A verification with a mesh for its last obstacle, or carried by a link."""
     made = made_up.verification()
     mesh = Mesh(
         "Wing <b>",
@@ -26,14 +27,18 @@ def judged(assumed: str, *notes: str) -> Verification:
         assumed_size=assumed,
         notes=notes,
     )
+    if carried:
+        arm = replace(made.problem.manipulator, bodies=(LinkBody(2, mesh),))
+        return replace(made, problem=replace(made.problem, manipulator=arm))
     obstacles = (*made.problem.scene.obstacles[:-1], mesh)
     return replace(made, problem=replace(made.problem, scene=Scene(obstacles)))
 
 
+@pytest.mark.parametrize("carried", [False, True])
 def test_an_assumed_size_stands_in_the_first_line_of_the_verdict(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    carried: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    verification = judged("12 x 3 x 0.6 mm", "something odd")
+    verification = judged("12 x 3 x 0.6 mm", "something odd", carried=carried)
     file = verification_file(verification, made_up.RECORD)
     assert file.assumed_sizes == ("'Wing <b>' is 12 x 3 x 0.6 mm",)
     words = "assuming that 'Wing <b>' is 12 x 3 x 0.6 mm; no unit is stated"

@@ -171,6 +171,20 @@ def octahedron(folder: Path) -> Path:
     return write(folder, "two.obj", text)
 
 
+@pytest.mark.parametrize(("scale", "noted"), [(1e-4, True), (1e-3, False)])
+def test_a_link_that_may_be_scaled_once_too_often_is_noted(
+    scale: float, noted: bool, tmp_path: Path
+) -> None:
+    """An octahedron of 2 and another one beside it, 8 along x."""
+    octahedron(tmp_path)
+    mesh = f'<mesh filename="two.obj" scale="{scale} {scale} {scale}"/>'
+    text = URDF.replace('<sphere radius="0.1"/>', mesh)
+    notes = read_robot(RobotFiles(write(tmp_path, "mesh.urdf", text))).notes
+    odd = [note for note in notes if "two.obj" in note]
+    words = "link 'arm': its mesh 'two.obj' is 0.8 mm large; is it in metres"
+    assert odd == ([f"{words} without a scale?"] if noted else [])
+
+
 def test_covers_of_a_mesh_hold_all_of_it(tmp_path: Path) -> None:
     octahedron(tmp_path)
     mesh = '<mesh filename="two.obj" scale="0.1 0.1 0.1"/>'

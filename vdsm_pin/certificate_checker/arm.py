@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from vdsm_pin.certificate_checker import solids
 from vdsm_pin.certificate_checker.balls import belongs, claim, column
 from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import Branch, Path, beside
@@ -84,7 +85,8 @@ class Arm:
         self._cover(header)
         self.pairs = [*self._pairs()]
         self.rows = Rows(self, rows)
-        self.notes = [note for mesh in self.meshes.values() for note in mesh.notes()]
+        self.notes = solids.sizes([*problem.scene.obstacles, *self.arm.bodies])
+        self.notes += [note for mesh in self.meshes.values() for note in mesh.notes()]
         self.notes += [f"{a} and {b} left out" for a, b in self.arm.ignore_pairs]
         self.notes.append(f"{joined} pieces join the rows")
 

@@ -25,6 +25,7 @@ from vdsm_pin.certificate_checker.solids import (
     Solid,
     cover,
     hulls,
+    sizes,
     solid,
 )
 from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose, Tree
@@ -331,6 +332,7 @@ class Robot:
         self.notes += [f"{len(pairs) - len(apart)} of {len(pairs)} link pairs left out"]
         for mesh in (one for one in things if isinstance(one, Mesh)):
             self.notes += mesh.notes()
+        self.notes += sizes(self.scene.obstacles)
 
     def _held(self, one: str, other: str, left: Any) -> bool:
         """Whether two links are held apart."""

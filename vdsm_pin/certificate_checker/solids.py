@@ -197,7 +197,6 @@ class Mesh(Solid):
     def __init__(self, mesh: solids.Mesh) -> None:
         super().__init__(mesh.name, mesh.vertices[mesh.triangles])
         self.surface, self.surface_only = Surface(self.points), mesh.solid is False
-        self.assumed_size = mesh.assumed_size
 
     def check_outside(
         self, rest: Any, points: Iterable[tuple[Any, Any, float]]
@@ -210,21 +209,24 @@ class Mesh(Solid):
                 triangles it stays.
         """
         zero, axes = rest
-        for (origin, turned), at, off in points:
-            if not self.surface_only:
-                seen = axes.transpose() * (origin + turned * at - zero)
-                why = self.surface.not_outside([*map(float, seen.entries())], off)
-                claim(not why, f"a body is not proved outside {self.name}: {why}")
+        for (origin, turned), at, off in () if self.surface_only else points:
+            seen = axes.transpose() * (origin + turned * at - zero)
+            why = self.surface.not_outside([*map(float, seen.entries())], off)
+            claim(not why, f"a body is not proved outside {self.name}: {why}")
 
     def notes(self) -> list[str]:
         """What was assumed of it."""
-        gap, size = 1e3 * self.surface.gap, self.assumed_size
-        told = {
-            f"{self.name} is a surface only": self.surface_only,
-            f"{self.name} is taken to be {size}; no unit is stated": size != "",
-            f"gaps of {self.name}, up to {gap:.2g} mm wide, are joined": gap > 0.0,
-        }
-        return [note for note, holds in told.items() if holds]
+        gap = 1e3 * self.surface.gap
+        told = [f"{self.name} is a surface only"] if self.surface_only else []
+        joined = f"gaps of {self.name}, up to {gap:.2g} mm wide, are joined"
+        return [*told, joined] if gap > 0.0 else told
+
+
+def sizes(things: Iterable[Any]) -> list[str]:
+    """Sizes that nobody states, of things as they were read: files or what has one."""
+    files = [y for x in things for y in (x, getattr(x, "solid", x))]
+    told = {y.name: y.assumed_size for y in files if isinstance(y, solids.FromFile)}
+    return [f"{k} is taken to be {v}; no unit is stated" for k, v in told.items() if v]
 
 
 def solid(obstacle: Any, told: Any = None) -> Any:

@@ -24,12 +24,18 @@ BEHIND: Final = (
 
 
 def assumed_sizes(problem: AnyProblem) -> tuple[str, ...]:
-    """The obstacles whose unit nobody states, with the size they were taken to have."""
-    return tuple(
-        f"{one.name!r} is {one.assumed_size}"
-        for one in map(solid_of, problem.scene.obstacles)
-        if isinstance(one, FromFile) and one.assumed_size
-    )
+    """The solids whose unit nobody states, with the size they were taken to have."""
+    found = (one for one in _from_files(problem) if one.assumed_size)
+    return tuple(f"{one.name!r} is {one.assumed_size}" for one in found)
+
+
+def _from_files(problem: AnyProblem) -> Iterator[FromFile]:
+    """What stands in files of its own: obstacles, and what an arm carries."""
+    bodies = problem.manipulator.bodies if isinstance(problem, PlanningProblem) else ()
+    carried = (body.solid for body in bodies)
+    for one in (*map(solid_of, problem.scene.obstacles), *carried):
+        if isinstance(one, FromFile):
+            yield one
 
 
 def assumption(sizes: Sequence[str]) -> str:
@@ -55,8 +61,7 @@ def file_notes(problem: AnyProblem) -> Iterator[str]:
     """What the readers of other robots, meshes and clouds say, a sentence each."""
     for carrier in problem.scene.carriers:
         yield from carrier.itself.notes
-    solids = map(solid_of, problem.scene.obstacles)
-    for one in (solid for solid in solids if isinstance(solid, FromFile)):
+    for one in _from_files(problem):
         kind = "mesh" if isinstance(one, Mesh) else "cloud"
         yield from (f"{kind} {one.name!r}: {note}" for note in one.notes)
 

@@ -21,9 +21,13 @@ from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.robots.files import HULLS, MeshCover, find_mesh
 from vdsm_pin.robots.hulls import covering_hull, covering_primitive
+from vdsm_pin.units import MM_PER_M
 
 LARGEST_LINK: Final = 20.0
 """A link's mesh larger than this must be in another unit; [m]."""
+
+SMALLEST_LINK: Final = 2e-3
+"""A link's mesh smaller than this may be scaled once too often, and is noted; [m]."""
 
 LinkPiece: TypeAlias = Hull | FlatCylinder
 MeshPieces: TypeAlias = tuple[IntArray, ...] | Hull
@@ -39,12 +43,14 @@ class LinkReader:
         solids: What stands for meshes.
         covers: By link, of each of its meshes that was read the triangles under each
             hull, or the primitive around it.
+        notes: What is odd about the meshes that were read.
     """
 
     path: Path
     package_dirs: tuple[Path, ...] = ()
     solids: MeshCover = HULLS
     covers: dict[str, list[MeshPieces]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
     def pieces(self, link: ET.Element) -> tuple[LinkPiece, ...]:
         """The convex pieces of a link, in its frame, which hold all of it.
@@ -131,6 +137,9 @@ class LinkReader:
                 'millimetres? expected scale="0.001 0.001 0.001"'
             )
             raise self._invalid(link, problem)
+        if size < SMALLEST_LINK:
+            odd = f"its mesh {name!r} is {MM_PER_M * size:.3g} mm large"
+            self.notes.append(f"link {link!r}: {odd}; is it in metres without a scale?")
         return np.asarray(points[mesh.triangles])
 
     def _found(self, link: str, name: str) -> Path:

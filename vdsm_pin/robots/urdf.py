@@ -58,7 +58,7 @@ def read_robot(files: RobotFiles) -> Robot:
         left_out=left_out,
         base=base,
         solids=solids,
-        notes=(*reader.notes, *_not_judged(document)),
+        notes=(*reader.notes, *links.notes, *_not_judged(document)),
         more_files=(*included, *links.meshes(document)),
         covers=links.covers,
     )
