@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vdsm_pin.geometry.arrays import turn_z_to
 from vdsm_pin.geometry.convex import FlatCylinder
 from vdsm_pin.geometry.kernels import piece_support
 from vdsm_pin.geometry.pieces import pack_pieces
@@ -36,3 +37,13 @@ def test_a_box_holds_a_cylinder_tilted_by_a_hair(tilt: float) -> None:
     reach = 0.3 * np.cos(tilt) + 2.0 * np.sin(tilt)
     assert pieces.node_high[0, 2] >= reach
     assert pieces.node_low[0, 2] <= -reach
+
+
+def test_a_turn_of_z_is_that_of_cross_products() -> None:
+    """To the last bit; along the coordinate axes too."""
+    axes = np.random.default_rng(0).normal(size=(50, 3))
+    for axis in [*(axes / np.linalg.norm(axes, axis=1)[:, None]), *np.eye(3)]:
+        x = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+        x /= np.linalg.norm(x)
+        expected = np.stack([x, np.cross(axis, x), axis], axis=1)
+        np.testing.assert_array_equal(turn_z_to(axis), expected)

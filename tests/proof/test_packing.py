@@ -157,6 +157,7 @@ def test_strokes_are_as_long_as_values_get() -> None:
         tree = random_tree(rng, 8)
         reach = rng.uniform(0.1, 2.0, tree.n_columns)
         unknown, known = pack_tree(tree), pack_tree(tree, reach)
+        assert unknown.axis is known.axis  # packed once
         bodies = [Body(1, (Hull(np.zeros((1, 3))),)), Body(0, (Hull(np.ones((1, 3))),))]
         task = pack_task(tree, bodies, PairTable.of([Pair(0, 1)]), RULES)
         later = for_motion(task, tree, reach, RULES)

@@ -225,9 +225,15 @@ def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
 def turn_z_to(axis: FloatArray) -> FloatArray:
     """A rotation whose third column is the axis, shape (3, 3); [-]."""
     start = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(start, axis)
+    x = _cross(start, axis)
     x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(axis, x), axis], axis=1)
+    return np.stack([x, _cross(axis, x), axis], axis=1)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """As np.cross of two vectors to the last bit, many times faster."""
+    (x, y, z), (u, v, w) = a.tolist(), b.tolist()
+    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """How far a real motion, its base and its obstacles may be off what was asked about."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import zip_longest
 from numbers import Real
 from types import MappingProxyType
@@ -115,11 +115,15 @@ class ErrorBox:
 
     def __eq__(self, other: object) -> bool:
         """Whether the errors are the same, in whatever units they were stated."""
-        return isinstance(other, ErrorBox) and astuple(self) == astuple(other)
+        return isinstance(other, ErrorBox) and self._values == other._values
 
     def __hash__(self) -> int:
         """Hash of the errors."""
-        return hash(astuple(self))
+        return hash(self._values)
+
+    @property
+    def _values(self) -> tuple[object, ...]:
+        return tuple(getattr(self, one.name) for one in fields(ErrorBox))
 
     def with_joint(self, joint: float) -> "ErrorBox":
         """A copy with one error of all joint angles; [rad]."""

@@ -1,5 +1,6 @@
 """A tree of joints as compiled code reads it, and where its frames stand."""
 
+from functools import lru_cache
 from math import cos, sin
 from typing import Final, NamedTuple
 
@@ -16,6 +17,9 @@ PRISMATIC: Final = 2
 
 ASKEW: Final = 3
 """An axis that is none of the joint's own x (0), y (1) and z (2)."""
+
+KEPT: Final = 8
+"""Trees that are kept packed, for the next question about the same robot."""
 
 
 class PackedTree(NamedTuple):
@@ -93,6 +97,12 @@ def pack_tree(tree: Tree, reach: FloatArray | None = None) -> PackedTree:
         tree: The joints.
         reach: How large each column of q gets, where that is known, (n_columns,).
     """
+    return _packed(tree)._replace(stroke=strokes(tree, reach))
+
+
+@lru_cache(maxsize=KEPT)
+def _packed(tree: Tree) -> PackedTree:
+    """The same without strokes."""
     joints = tree.joints
     n, along = len(joints), [_along(joint) for joint in joints]
     sense = np.array([sign for _, sign in along])
@@ -114,7 +124,7 @@ def pack_tree(tree: Tree, reach: FloatArray | None = None) -> PackedTree:
         column=np.array(columns, dtype=np.int64),
         ratio=np.array(ratio) * sense,
         offset=np.array([joint.offset for joint in joints]) * sense,
-        stroke=strokes(tree, reach),
+        stroke=np.zeros(0),
     )
 
 
