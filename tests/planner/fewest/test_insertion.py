@@ -1,6 +1,5 @@
 """Ways in through openings: of the tip, of the arm that follows, of the motion."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -108,14 +107,12 @@ def bent_arms(rng: np.random.Generator, count: int) -> FloatArray:
 
 def off_curve(points: FloatArray, curve: FloatArray) -> float:
     """Largest distance of points from a polyline."""
-    worst = []
-    for p in points:
-        gaps = []
-        for a, b in itertools.pairwise(curve):
-            t = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-300), 0.0, 1.0)
-            gaps.append(np.linalg.norm(a + t * (b - a) - p))
-        worst.append(min(gaps))
-    return float(max(worst))
+    begin, step = curve[:-1], np.diff(curve, axis=0)
+    from_begin = points[:, None] - begin
+    squares = np.maximum((step**2).sum(axis=1), 1e-300)
+    share = np.clip((from_begin * step).sum(axis=2) / squares, 0.0, 1.0)
+    gaps = np.linalg.norm(share[..., None] * step - from_begin, axis=2)
+    return float(gaps.min(axis=1).max())
 
 
 def test_arms_that_follow_keep_their_links_and_the_curve() -> None:
