@@ -4,6 +4,7 @@ import ast
 import re
 import sys
 import tomllib
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
@@ -55,6 +56,13 @@ def imported(folder: str) -> frozenset[str]:
     return frozenset(name.split(".")[0] for name in names)
 
 
+@cache
+def providers_of() -> Mapping[str, list[str]]:
+    """Which installed packages bring a top name."""
+    return packages_distributions()
+
+
+@cache
 def ours() -> set[str]:
     """Modules and packages that this repository holds."""
     paths = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
@@ -73,7 +81,7 @@ def ours() -> set[str]:
 def test_every_library_imported_is_declared(
     folder: str, extras: tuple[str, ...]
 ) -> None:
-    providers = packages_distributions()
+    providers = providers_of()
     known = declared(*extras)
     foreign = imported(folder) - set(sys.stdlib_module_names) - ours()
     assert "numpy" in foreign

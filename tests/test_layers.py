@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tokenize
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -78,7 +79,8 @@ def owner(module: str) -> str:
     return module.removeprefix("vdsm_pin").lstrip(".").split(".")[0]
 
 
-def imported(path: Path) -> set[str]:
+@cache
+def imported(path: Path) -> frozenset[str]:
     names: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -90,7 +92,7 @@ def imported(path: Path) -> set[str]:
                 names |= {f"vdsm_pin.{alias.name}" for alias in node.names}
             else:
                 names.add(node.module)
-    return names
+    return frozenset(names)
 
 
 def own_layer(path: Path) -> str:
