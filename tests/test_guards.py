@@ -1,20 +1,16 @@
 """Guards on cost that no busy machine can upset: counts, and ratios of counts.
 
-Compiled once, never again; Python's work does not grow with the rows; the proof needs
-few subdivisions and Coal few calls.
+Python's work does not grow with the rows; the proof needs few subdivisions and Coal few
+calls.
 """
 
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
-import numba
 import numpy as np
 import pytest
-from numba.core import event
-from problem_files import NEAR, write_problem
 
 from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
 from vdsm_pin.arm.kinematics import joint_angles, joint_centres
@@ -30,44 +26,6 @@ from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.robot_model import load_robot
-
-COUNTED = """
-import sys
-from numba.core import event
-from vdsm_pin.cli import main
-with event.install_recorder("numba:compile") as recorded:
-    for words in (
-        ["plan", sys.argv[1], "--strategy", "paper", "--out", sys.argv[2]],
-        ["verify", sys.argv[1], "--trajectory", sys.argv[2] + "/trajectory.csv",
-         "--out", sys.argv[2]],
-    ):
-        try:
-            main(words)
-        except SystemExit as ended:
-            assert not ended.code, ended.code
-begun = [one for _, one in recorded.buffer if one.is_start]
-names = {one.data["dispatcher"].__qualname__ for one in begun}
-sys.stderr.write("compiled: " + " ".join(sorted(names)))
-"""
-
-
-def compiled_by(problem: Path, out: Path) -> list[str]:
-    """Functions that a process compiled to plan and verify a problem."""
-    words = [sys.executable, "-c", COUNTED, str(problem), str(out)]
-    ended = subprocess.run(words, capture_output=True, text=True, check=True)
-    return ended.stderr.rpartition("compiled:")[2].split()
-
-
-def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
-    problem = write_problem(tmp_path / "near.yaml", NEAR)
-    compiled_by(problem, tmp_path / "first")
-    assert compiled_by(problem, tmp_path / "second") == []
-
-
-def test_a_compilation_would_be_counted() -> None:
-    with event.install_recorder("numba:compile") as recorded:
-        numba.njit(lambda x: x + 1)(1)
-    assert recorded.buffer
 
 
 def calls(run: Callable[[], object]) -> int:

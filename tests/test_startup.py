@@ -54,7 +54,10 @@ def test_help_imports_nothing_heavy(command: list[str]) -> None:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where obs1 was planned and verified, so that all its machine code is there."""
+    """Where obs1 was planned and verified, so that all its machine code is there.
+
+    Whoever comes next compiles nothing: without numba nobody can.
+    """
     folder = tmp_path_factory.mktemp("obs1")
     run("plan", "paper/obs1", "--out", str(folder))
     run(*verifying(folder))
