@@ -90,10 +90,13 @@ def test_ball_that_is_grazed_is_passed() -> None:
 
 def test_start_and_pinned_waypoints_in_the_way_are_named() -> None:
     motion = planned("paper/obs2")[1]
-    for row, pinned in ((0, ()), (700, (700,))):
-        words = f"waypoint {row} stays, and there link 4 and ball are .* mm nearer"
+    for row, pinned, gap, how in (
+        (0, (), 0.001, r"are [\d.]* mm nearer than required"),
+        (700, (700,), -0.002, "meet"),
+    ):
+        words = f"waypoint {row} stays, and there link 4 and ball {how}$"
         with pytest.raises(Infeasible, match=words):
-            repair_arm(beside("paper/obs2", row, 3, -0.002), motion, pinned)
+            repair_arm(beside("paper/obs2", row, 3, gap), motion, pinned)
     with pytest.raises(InvalidInput, match="pinned waypoint is 9999, expected 0 to"):
         repair_arm(planned("paper/obs2")[0], motion, (9999,))
 

@@ -91,9 +91,8 @@ def test_joint_errors_are_rounded_to_the_safe_side_and_told_apart() -> None:
     error, more = math.radians(0.052978), math.radians(0.053407)
     assert (survived(error), lost(more)) == ("±0.0529°", "±0.0535°")
     assert survived(math.radians(0.13169)) == "±0.1316°"
-    assert (survived(0.0), survived(None), lost(math.nan)) == (
-        "±0.0000°", MISSING, MISSING,
-    )  # fmt: skip
+    assert (survived(0.0), lost(0.0)) == ("none", "±0.0000°")
+    assert (survived(None), lost(math.nan)) == (MISSING, MISSING)
 
 
 def test_what_is_proved_is_never_rounded_up() -> None:

@@ -79,8 +79,7 @@ class _Motion:
         tips, added = _tips(problem, rows), origins.given < 0
         whole[added] = slopes.led_back(whole[added], tips[added])
         room, _ = slopes.room(whole, margins)
-        names = [slopes.names[k] for k in margins]
-        bad = origins.too_near(room, np.array([*margins.values()]), names)
+        bad = origins.too_near(room, *slopes.asked(margins))
         whole[bad] = slopes.up(whole[bad], tips[bad], margins)
         kept = origins.kept(rows.joints, bad)
         moved = Trajectory.of_joints(
@@ -114,8 +113,7 @@ class _Motion:
             whole = np.hstack([q, more[k]])[None]
             return slopes.up(whole, tips[k : k + 1], margins)[0, :width]
 
-        names = [slopes.names[k] for k in margins]
-        origins.too_near(room(rows.q), np.array([*margins.values()]), names)
+        origins.too_near(room(rows.q), *slopes.asked(margins))
         rows, moved = bulged(rows, lambda q: room(q).min(axis=1), up, origins.fixed)
         rows = _led_back(slopes, rows, moved & ~origins.fixed, tips)
         kept = places.old | moved  # in between the curve is what it was

@@ -68,7 +68,8 @@ class _Motion:
         more = np.array([*margins.values()])
         slopes = _Slopes(self.cell, pairs, more)
         names = [self.cell.names(pair) for pair in pairs]
-        bad = origins.too_near(slopes.gaps(rows.q, others), more, names)
+        required = np.array([pair.required for pair in pairs])
+        bad = origins.too_near(slopes.gaps(rows.q, others), more, required, names)
         if rows.times is not None and rows.rates is not None:
             rows, bad = bulged(
                 rows,

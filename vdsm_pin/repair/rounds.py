@@ -144,13 +144,18 @@ class Origins:
         return Origins(self.base[keep], self.given[keep], self.fixed[keep])
 
     def too_near(
-        self, room: FloatArray, margins: FloatArray, names: Sequence[str]
+        self,
+        room: FloatArray,
+        margins: FloatArray,
+        required: FloatArray,
+        names: Sequence[str],
     ) -> BoolArray:
         """Which rows to push apart, shape (n_rows,).
 
         Args:
             room: Of pairs beyond what they are to get, shape (n_rows, n_pairs); [m].
             margins: What of that is more than required, shape (n_pairs,); [m].
+            required: Of them, shape (n_pairs,); [m].
             names: Of the pairs.
 
         Raises:
@@ -159,11 +164,10 @@ class Origins:
         """
         short = room + margins
         for k in np.flatnonzero(self.fixed & (short.min(axis=1) < 0.0)):
-            message = (
-                f"waypoint {self.given[k]} stays, and there "
-                f"{names[int(np.argmin(short[k]))]} are "
-                f"{-MM_PER_M * short[k].min():.3f} mm nearer than required"
-            )
+            pair, missing = int(np.argmin(short[k])), -float(short[k].min())
+            nearer = f"are {MM_PER_M * missing:.3f} mm nearer than required"
+            how = nearer if missing <= required[pair] else "meet"
+            message = f"waypoint {self.given[k]} stays, and there {names[pair]} {how}"
             raise Infeasible(message)
         bad = (room.min(axis=1) < 0.0) & ~self.fixed
         if (new := int((bad & (self.given < 0)).sum())) > MOST:

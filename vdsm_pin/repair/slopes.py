@@ -49,6 +49,14 @@ class Slopes:
         self._scale = joint_scale(self._arm)
         self._goal = TIP * problem.tip_tolerance
 
+    def asked(
+        self, margins: dict[int, float]
+    ) -> tuple[FloatArray, FloatArray, list[str]]:
+        """Margins of pairs and what is required of them, (n_pairs,) [m], and names."""
+        pairs = [*margins]
+        names = [self.names[k] for k in pairs]
+        return np.array([*margins.values()]), self._required[pairs], names
+
     def room(
         self, q: FloatArray, margins: dict[int, float]
     ) -> tuple[FloatArray, FloatArray]:

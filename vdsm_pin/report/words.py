@@ -187,7 +187,7 @@ def measured(value: float | None, unit: str) -> str:
 
 def survived(error: float | None) -> str:
     """A joint error that is proved to be survived, rounded down; [rad]."""
-    return _joint_error(error, math.floor)
+    return "none" if error == 0.0 else _joint_error(error, math.floor)
 
 
 def lost(error: float | None) -> str:
