@@ -63,6 +63,8 @@ def test_each_link_is_as_near_as_is_proved(name: str, tmp_path: Path) -> None:
             same = pytest.approx(told(centres)[0, :count], abs=TOLERANCES.bracket_gap)
             assert pieces[:count] == same
         for link, nearest in enumerate(told(centres)[0], start=1):
+            alone = told(centres[:, link - 1 : link + 1], link - 1)[0, 0]
+            assert alone == pytest.approx(nearest, abs=TOLERANCES.bracket_gap)
             mine = [k for k, pair in enumerate(proof.pairs)
                     if pair.obstacle and pair.link == link]  # fmt: skip
             low, high = (float(proof.best[mine, at].min()) for at in (LOW, UP))

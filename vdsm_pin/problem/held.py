@@ -60,16 +60,10 @@ class HeldGroup:
         return float(self.radii.max())
 
     @property
-    def by_link(self) -> FloatArray:
-        """The radii of whole links, the last with the tool on it, shape (N,); [m]."""
-        last = self.radii[self.n_links - 1 :].max()
-        return np.append(self.radii[: self.n_links - 1], last)
-
-    @property
     def parted(self) -> bool:
-        """Whether of the last link and its tool one alone is held apart."""
-        last = np.isfinite(self.radii[self.n_links - 1 :])
-        return bool(last.any() and not last.all())
+        """Whether the last link and its tool are not held apart by the same radius."""
+        last = self.radii[self.n_links - 1 :]
+        return bool((last != last[0]).any())
 
     def held(
         self, ends: FloatArray, axes: IntArray | None
@@ -82,19 +76,22 @@ class HeldGroup:
                 the thickest.
 
         Returns:
-            Shape (m,), (m, 2, 3) and (m,); [m].
+            Shape (m,), (m, 2, 3) and (m,); where the last link and its tool differ, a
+            piece that is both is there twice; [m].
         """
+        which = np.arange(len(ends))
         if axes is None:
-            return np.arange(len(ends)), ends, np.full(len(ends), self.radius)
-        last = axes == self.n_links - 1
-        radii = np.where(last, self.by_link[-1], self.radii[axes])
-        which = np.flatnonzero(np.isfinite(radii))
-        some = ends[which]
+            return which, ends, np.full(len(ends), self.radius)
         if self.parted:
-            last = np.flatnonzero(last[which])
-            joint = some[last, 0] + self.shaft * (some[last, 1] - some[last, 0])
-            some[last, int(np.isfinite(self.radii[self.n_links - 1]))] = joint
-        return which, some, radii[which]
+            last = np.flatnonzero(axes == self.n_links - 1)
+            tool = ends[last]
+            tool[:, 0] += self.shaft * (tool[:, 1] - tool[:, 0])
+            ends = np.concatenate([ends, tool])
+            ends[last, 1] = tool[:, 0]
+            which = np.append(which, last)
+            axes = np.append(axes, np.full(len(last), self.n_links))
+        held = np.isfinite(self.radii[axes])
+        return which[held], ends[held], self.radii[axes][held]
 
 
 @dataclass(frozen=True)
@@ -167,6 +164,7 @@ class HeldApart:
         """
         cuts = np.zeros(self.arm.n_links + 1, dtype=np.bool_)
         for one in self.groups:
-            cuts[1:-1] |= one.by_link[1:] != one.by_link[:-1]
+            links = one.radii[: one.n_links]
+            cuts[1:-1] |= links[1:] != links[:-1]
             cuts[-2] |= one.parted
         return cuts

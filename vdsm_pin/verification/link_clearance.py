@@ -117,7 +117,7 @@ def _from_held(problem: PlanningProblem) -> Callable[..., FloatArray]:
         for group, scene in zip(groups, packed, strict=True):
             which, some, radii = group.held(ends, number)
             gaps = link_clearances(*scene, some, 0.0, pad, goal)[:, 0] - radii
-            least[which] = np.minimum(least[which], gaps)
+            np.minimum.at(least, which, gaps)
         return least.reshape(shape)
 
     return clearances

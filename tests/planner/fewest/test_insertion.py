@@ -17,6 +17,7 @@ from benchmarks.hrm2000.sweeps import Sweep, least_bore
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest import elastic_band
@@ -39,6 +40,7 @@ from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.problem.scene import Obstacle, Scene
+from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
@@ -198,6 +200,19 @@ def two_ways(middle: float) -> PlanningProblem:
 def side_of(route: FloatArray) -> float:
     """Where a way passes the wall; [m]."""
     return float(route[np.abs(route[:, 0] - 1.0).argmin(), 1])
+
+
+def test_a_thin_tool_goes_where_its_link_does_not() -> None:
+    """A window wider than the tool and narrower than the link that carries it."""
+    arm = replace(ARM, tool=Tool(0.2, 0.012))
+    points = np.array([[0.62, -0.06, 0.05], [0.66, -0.06, 0.05]])
+    task = problem(*wall(0.55, -0.06, 0.05, 0.025), points=points, closed=False)
+    task = replace(
+        task, manipulator=arm, tip_path=replace(task.path, start=np.array(START))
+    )
+    found = plan_and_verify(task, "fewest", load_robot(arm))
+    assert found.verification.verdict is Verdict.CERTIFIED
+    assert found.verification.coverage == pytest.approx(1.0)
 
 
 def test_a_second_way_takes_the_other_window() -> None:
@@ -465,8 +480,9 @@ def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
     assert counts[1].mean() < 0.7 * counts[0].mean()
 
 
-def test_knees_of_an_arm_whose_base_is_fixed_are_taken_away() -> None:
-    """Many small bends become few; base and tips stay where they are."""
+@pytest.mark.parametrize("drawn", [True, False])
+def test_knees_of_an_arm_whose_base_is_fixed_are_taken_away(drawn: bool) -> None:
+    """On a path and on the way to a goal; base and tips stay where they are."""
     arm = replace(ARM, base_range=(0.0, 0.0))
     task = replace(problem(points=LOOP, start=START), manipulator=arm)
     size = np.linspace(0.5, 1.0, 5)[:, None]
@@ -474,7 +490,7 @@ def test_knees_of_an_arm_whose_base_is_fixed_are_taken_away() -> None:
     centres = joint_centres(arm, np.zeros(5), alpha, theta)
     corners = Corners(
         centres[:, -1], coordinates(arm, centres, directed=True), np.arange(5.0),
-        np.ones(4, dtype=np.bool_), np.full((4, 2), -1),
+        np.full(4, drawn), np.full((4, 2), -1),
     )  # fmt: skip
     judge = judge_of(task)
     fewer = sparser(judge, corners)

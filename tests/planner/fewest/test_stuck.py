@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
+from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.errors import NoPlanFound, OutOfReach
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box
@@ -24,6 +25,7 @@ from vdsm_pin.planner.fewest.stuck import (
     following,
     no_way_in,
     on_the_path,
+    passage,
     too_narrow,
     where_stuck,
 )
@@ -198,3 +200,12 @@ def test_a_number_of_angles_that_is_nowhere_proved_minimal_is_not_told() -> None
     changed = np.array([2, 3, 1])
     assert minimal(changed, np.array([1, 1, 0])) == []
     assert "minimal at 1 of 3 waypoints" in minimal(changed, np.array([1, 3, 0]))[0]
+
+
+def test_a_passage_is_held_against_the_tool_where_there_is_one() -> None:
+    task, place = behind(0.03), np.array([0.6, 0.0, 0.0])
+    assert too_narrow(task, place)
+    arm = replace(task.manipulator, tool=Tool(0.2, 0.012))
+    armed = replace(task, manipulator=arm)
+    assert not too_narrow(armed, place)
+    assert "60.000 mm wide, for a body of 24.000 mm" in passage(armed, place)

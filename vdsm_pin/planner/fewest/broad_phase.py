@@ -120,8 +120,8 @@ class BroadPhase:
             boxes, surfaces = cover.bounds(
                 some, radii, self.far, self.floor, self.deadline
             )
-            clearances[which] = np.minimum(clearances[which], boxes)
-            mesh[which] = np.minimum(mesh[which], surfaces)
+            np.minimum.at(clearances, which, boxes)
+            np.minimum.at(mesh, which, surfaces)
         # A step below the distance will do, but not where it decides.
         near = clearances < self.far
         near |= mesh < min(self.far, self.floor + STEP)

@@ -20,6 +20,7 @@ from vdsm_pin.planner.upper_clearance import (
     nearest,
     upper_distances,
 )
+from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
 
@@ -145,14 +146,18 @@ def _broken(problem: PlanningProblem, centres: FloatArray) -> Iterator[tuple[str
 
 def _needed(problem: PlanningProblem) -> float:
     """Width of the tip with its clearance on both sides; [m]."""
-    tip = float(problem.manipulator.reaches[-1])
-    return 2.0 * (tip + problem.required_clearance)
+    return 2.0 * (_tip_reach(problem) + problem.required_clearance)
+
+
+def _tip_reach(problem: PlanningProblem) -> float:
+    """How far the last link reaches from its axis at the tip, or its tool; [m]."""
+    return float(problem.held.radii[TIP].max(initial=0.0))
 
 
 def passage(problem: PlanningProblem, place: FloatArray) -> str:
     """The narrowest place of the best way, its width and that of the body."""
     name, distance = nearest(problem, place)
-    radius = problem.manipulator.reaches[-1]
+    radius = _tip_reach(problem)
     return (
         f"the best way in is narrowest at {problem.in_file(place)}, beside {name!r}: "
         f"{in_mm(max(0.0, 2.0 * distance))} wide, for a body of "
