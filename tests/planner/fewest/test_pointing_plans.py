@@ -12,13 +12,18 @@ from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
+from vdsm_pin.planner.fewest import strategy
 from vdsm_pin.planner.fewest.charts import turned_towards
+from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.motion import Corners
+from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.problem.desired_path import Blocked, DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import AimError, Pointing, angles_between
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.refinement import Refinement, plan_and_verify
+from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.pointing import NAME
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -86,6 +91,27 @@ def test_the_last_link_looks_there_all_along_the_path(
     assert row.verdict is Verdict.CERTIFIED
     assert largest_angle(task, found) <= row.worst <= pointing.cone
     assert found.verification.coverage == pytest.approx(1.0)
+
+
+def test_no_knee_is_left_that_can_still_be_taken_away(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also where the motion was pulled straight since."""
+    finished = []
+
+    def seen(judge: Judge, corners: Corners) -> Corners:
+        finished.append((judge, corners))
+        return corners
+
+    monkeypatch.setattr(strategy, "straightened", seen)
+    task = looking(Pointing(float(np.deg2rad(5.0)), None, EACH))
+    strategy.plan_fewest(task, link_clearance(task), 0.0)
+    ((judge, corners),) = finished
+    counts = [
+        judge.look(one.tips, one.offsets)[1].sum()
+        for one in (corners, sparser(judge, corners))
+    ]
+    assert counts[0] == counts[1]
 
 
 CAMERA = LinkBody(

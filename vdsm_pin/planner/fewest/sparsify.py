@@ -24,6 +24,8 @@ ROUNDS: Final = 3
 def sparser(judge: Judge, corners: Corners) -> Corners:
     """The motion with fewer changed angles where the tip draws, every interval clear.
 
+    A motion to a goal draws nothing: it has fewer all the way.
+
     Args:
         judge: Says what is clear.
         corners: The motion; given by directions, it comes back by projections where all
@@ -66,7 +68,8 @@ def _without(judge: Judge, corners: Corners, joint: int, way: int) -> Corners:
     """
     arm, tips = judge.problem.manipulator, corners.tips
     on = np.append(corners.drawn, False) | np.append(False, corners.drawn)
-    # The start is where it is.
+    # Where nothing is drawn, the way to a goal counts. The start is where it is.
+    on |= not on.any()
     rows, trial = 1 + np.flatnonzero(on[1:]), corners.offsets.copy()
     bent = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
     rows, before = rows[bent[:, joint]], bent[bent[:, joint]].sum(axis=1)

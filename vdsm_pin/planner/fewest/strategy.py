@@ -259,6 +259,9 @@ def _written(
     if not isinstance(outcome.found, Searched):
         corners = sparser(judge, corners)
     corners = shortcut(judge, corners, weights)
+    if weights == FEWEST:
+        # What is straighter has more knees to spare.
+        corners = sparser(judge, corners)
     corners = lifted(judge, straightened(judge, corners))
     turn = problem.planned_row_change
     rows = dense_rows(arm, corners, problem.path.spacing, turn, judge.slack)
