@@ -249,7 +249,9 @@ def notes_of(
     angles = bends_of(centres[on_path])
     changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
     tips = centres[on_path, -1]
-    least = least_changed(held_from(problem), clearance, tips)
+    # No more than two are ever proved necessary.
+    few, least = changed <= 2, np.zeros_like(changed)
+    least[few] = least_changed(held_from(problem), clearance, tips[few])
     if (changed < least).any():
         worst = int(np.flatnonzero(changed < least)[0])
         message = (
