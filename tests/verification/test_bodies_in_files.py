@@ -226,7 +226,7 @@ def test_a_plan_keeps_the_feed_clear_or_says_what_is_in_its_way(
         words = ["plan", str(made.problem), "--out", str(tmp_path / "out")]
         main([*words, "--time-limit", "60" if bend == 60.0 else "2"])
     told = "".join(capsys.readouterr())
-    assert "the feed keeps x0 above -45.95" in told
+    assert "the feed keeps x0 above \N{MINUS SIGN}45.95" in told
     assert ended.value.code == (bend < 60.0)
     assert ("certified" in told) == (bend == 60.0)
 
