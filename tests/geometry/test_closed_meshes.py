@@ -156,6 +156,8 @@ def test_a_corner_on_an_edge_is_joined_to_it(off: float) -> None:
     again = close_mesh(*Made(np.concatenate([other, other[7:8]]), [], []).indexed())
     assert again.closed and again.single.sum() == len(other) + 1 and again.single[-1]
     assert found.signed.all() and not found.single.any()
+    twice = close_mesh(*Made(np.concatenate([seamed, seamed[7:8]]), [], []).indexed())
+    assert twice.signed.sum() == len(seamed) + 1 and not twice.single.any()
     assert found.closed
     assert len(found.beside) == 1
     assert found.gap <= off * np.sqrt(3.0)

@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 
 from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.arm.mounted import Feed
 from vdsm_pin.errors import CertificateTooLarge
 from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -31,14 +34,24 @@ from vdsm_pin.proof.prover import RANK
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification import certificate_lines, coal_missing, proved_lowers
+from vdsm_pin.verification import (
+    certificate_lines,
+    clearance,
+    coal_missing,
+    proved_lowers,
+)
 from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.brackets import (
     ClearanceChunk,
     ClearanceProfile,
     LeastClearances,
 )
-from vdsm_pin.verification.clearance import _merged, _steps, profile_of
+from vdsm_pin.verification.clearance import (
+    _merged,
+    _steps,
+    profile_of,
+    prove_clearance,
+)
 from vdsm_pin.verification.clearance_check import (
     LINKS,
     OBSTACLES,
@@ -616,6 +629,42 @@ def test_pairs_that_come_nearest_are_listed_obstacles_first() -> None:
             assert (one.lower, one.upper) == (least.lower[k], least.upper[k])
             assert (one.link_point == least.link_point[k]).all()
             assert (one.other_point == least.other_point[k]).all()
+
+
+@pytest.mark.parametrize("feed", [None, Feed(0.3, 0.05)])
+def test_a_profile_has_each_link_by_itself(feed: Feed | None) -> None:
+    """A ball beside one of them; the feed counts as what link 1 is mounted on."""
+    arm, still = replace(ARM, feed=feed), np.zeros((1, 8))
+    rest = Trajectory([False], [0.0], [0.0], still, still)
+    for k in range(8 if feed is None else 1):
+        x = ARM.stations[k] + ARM.link_lengths[k] / 2.0 if feed is None else -0.15
+        thick = ARM.link_radius if feed is None else 0.05
+        ball = Sphere("ball", np.array([x, 0.1 + thick + 0.004, 0.0]), 0.1)
+        asked = PlanningProblem("p", arm, Scene((ball,)), None, 0.0, np.eye(4))
+        profile = prove_clearance(asked, rest, ErrorBox()).profile
+        assert profile.link_lower.shape == (1, 8)
+        assert int(profile.link_lower.argmin()) == k
+        assert profile.link_lower.min() == pytest.approx(0.004, abs=1e-6)
+        assert profile.link_upper[0, k] == pytest.approx(0.004, abs=1e-6)
+        assert np.sort(profile.link_lower[0])[1] > 0.01
+
+
+def test_sinks_hear_of_every_interval_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In chunks that follow one another, and the proof says how many were sent."""
+    monkeypatch.setattr(clearance, "CHUNK", 7)
+    ball = Sphere("ball", np.array([1.0, 0.3, 0.0]), 0.1)
+    asked = PlanningProblem("p", ARM, Scene((ball,)), None, 0.0, np.eye(4))
+    for rows in (1, 2, 8, 30):
+        still, chunks = np.zeros((rows, 8)), list[ClearanceChunk]()
+        rest = np.zeros(rows)
+        motion = Trajectory(rest > 0, rest, np.linspace(0, 0.1, rows), still, still)
+        proof = prove_clearance(asked, motion, ErrorBox(), (chunks.append,))
+        assert proof.sent == proof.n_intervals == max(1, rows - 1)
+        heard = [c.first_interval + k for c in chunks for k in range(len(c.lower))]
+        assert heard == [*range(proof.n_intervals)]
+        lower = np.concatenate([chunk.lower for chunk in chunks])
+        assert (lower.min(axis=0) >= proof.least.lower).all()
+        assert (lower.min(axis=0) <= proof.least.upper).all()
 
 
 def test_evidence_of_coal_is_its_largest_disagreement() -> None:

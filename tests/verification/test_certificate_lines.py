@@ -39,6 +39,11 @@ def test_claims_leave_the_checker_room_where_they_may() -> None:
         if lower - required > 2.5 / PER_METRE:
             assert Fraction(lower) - claim >= Fraction(99, 100 * PER_METRE)
     assert _counted(2.2587605964, 0.0) == 22587605963
+    for parts in (0, PER_METRE // 2):  # required to the last part
+        required = parts / PER_METRE
+        assert _counted(required + 1.5 / PER_METRE, required) == parts
+        assert _counted(required + 0.5 / PER_METRE, required) == parts
+        assert _counted(required, required) == parts
 
 
 def test_a_link_is_told_where_its_order_or_cover_is_not_that_of_its_file() -> None:

@@ -1,6 +1,7 @@
 """What the largest joint error is made of, part by part; oracles: formulas, loops."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, LOW
+from vdsm_pin.proof.terms import UNDECIDED
+from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import robust
 from vdsm_pin.verification.robust import (
@@ -204,3 +208,37 @@ def test_far_obstacles_are_left_out_where_a_counterexample_is_sought(
         args: Any = scene(count), None, ErrorBox(), 0.01
         assert np.isnan(refuted_joint_error(*args, clearances=clearances))
     assert seen == [MANY, 7]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_pairs_left_open_that_are_nearest_are_searched(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(seed)
+    n, asked, swept = int(rng.integers(0, 9)), list[int](), list[tuple[int, int]]()
+    counts, best = rng.integers(0, 2, (n, 3)), rng.normal(size=(n, BEST))
+    best[:, AT_UPPER] = best[:, AT_LOWER] = 1.0
+    errors = {k: None if rng.random() < 0.4 else rng.normal(size=17) for k in range(n)}
+    proving = SimpleNamespace(
+        n_intervals=7, results=SimpleNamespace(counts=counts),
+        sweep=lambda *interval: swept.append(interval),
+    )  # fmt: skip
+    proof = SimpleNamespace(proving=proving, best=best)
+
+    def search(k: int) -> Any:
+        asked.append(k)
+        found = None if errors[k] is None else SimpleNamespace(offsets=errors[k])
+        return SimpleNamespace(smallest=lambda moments: found)
+
+    pairs = SimpleNamespace(pair=lambda k: k)
+    monkeypatch.setattr(robust, "prove_problem", lambda *_, **__: proof)
+    monkeypatch.setattr(robust, "ArmPairs", lambda _: pairs)
+    monkeypatch.setattr(robust, "erring_pair", lambda *args: args[2])
+    monkeypatch.setattr(robust, "Search", search)
+    told: Any = None
+    found = robust._smallest(told, told, ErrorBox(), NO_LIMIT)
+    left = [k for k in range(n) if counts[k, UNDECIDED]]
+    assert asked == sorted(left, key=lambda k: best[k, LOW])[:3]
+    assert swept == [(0, 7)]
+    offsets = [errors[k] for k in asked]
+    assert found == [np.abs(one[1:]).max() for one in offsets if one is not None]
