@@ -50,11 +50,21 @@ def is_equivalent(key: str, known: dict[str, str]) -> bool:
     return key in known or key.partition(" (no. ")[0] + " (all)" in known
 
 
+def gone(every: list[Change], known: dict[str, str]) -> list[str]:
+    """Keys that name no change of these modules any more."""
+    keys = {one.key for one in every}
+    keys |= {key.partition(" (no. ")[0] + " (all)" for key in keys}
+    modules = {one.module for one in every}
+    return [k for k in known if k.partition(":")[0] in modules and k not in keys]
+
+
 def sampled(groups: list[Group], size: int, seed: int) -> dict[str, list[Change]]:
-    """A sample of all changes, by group."""
+    """A sample of all changes, by group; tells what is listed and gone."""
     every = [
         (g.name, c) for g in groups for m in modules_of(g) for c in changes(ROOT, m)
     ]
+    for key in gone([change for _, change in every], equivalent_changes()):
+        print(f"no such change: {key}", flush=True)
     chosen = random.Random(seed).sample(every, min(size, len(every)))
     return {g.name: [c for name, c in chosen if name == g.name] for g in groups}
 

@@ -8,6 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from analysis.mutation.__main__ import gone  # noqa: E402
 from analysis.mutation.changes import Change, changes, uses  # noqa: E402
 from analysis.mutation.coverage_map import Asked, CoverageMap, coverage_map  # noqa: E402
 from analysis.mutation.trial import Task  # noqa: E402
@@ -62,6 +63,14 @@ def test_changes_alike_in_one_function_are_told_apart(tmp_path: Path) -> None:
         "module.py:one: 1 -> 2 (no. 2)",
         "module.py:two: 1 -> 2",
     ]
+
+
+def test_what_is_listed_and_gone_is_told(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text("def one(x):\n    return x[1] + x[1]\n")
+    every, key = changes(tmp_path, "module.py"), "module.py:one: 1 -> 2"
+    listed = [key, f"{key} (no. 2)", f"{key} (no. 3)", f"{key} (all)"]
+    known = dict.fromkeys([*listed, "module.py:two: 1 -> 2", "other.py:: 1 -> 2"], "")
+    assert gone(every, known) == [f"{key} (no. 3)", "module.py:two: 1 -> 2"]
 
 
 def test_text_and_annotations_stay(tmp_path: Path) -> None:
