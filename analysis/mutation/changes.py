@@ -244,6 +244,12 @@ def _effects(tree: ast.Module) -> dict[int, tuple[int, ...]]:
             for node in ast.walk(statement):
                 if hasattr(node, "lineno"):
                     found[id(node)] = (node.lineno, statement.lineno)
+    for statement in tree.body:
+        if isinstance(statement, ast.ClassDef):  # what its methods run, too
+            methods = [m for m in statement.body if isinstance(m, ast.FunctionDef)]
+            within = [k for m in methods for k in
+                      range(m.body[0].lineno, (m.end_lineno or 0) + 1)]  # fmt: skip
+            users.setdefault(statement.name, []).extend(within)
     for node_id, names in _names(tree).items():
         found[node_id] = tuple(line for name in names for line in users.get(name, []))
     for function in ast.walk(tree):

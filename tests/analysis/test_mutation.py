@@ -96,10 +96,11 @@ def test_what_runs_at_import_has_its_effect_where_its_name_is_used(
     assert names.pop("2") == ("SIZE",)
     assert not any(names.values())
     (tmp_path / "fields.py").write_text(
-        "class One:\n    x: int = 7\n\n\ndef one():\n    return One()\n"
+        "class One:\n    x: int = 7\n\n    def y(self):\n        return self.x\n\n\n"
+        "def one():\n    return One()\n"
     )
     (default,) = changes(tmp_path, "fields.py")
-    assert (default.names, default.lines) == (("One",), (6,))
+    assert (default.names, default.lines) == (("One",), (9, 5))
     other = tmp_path / "other.py"
     other.write_text("from module import SIZE\n\nTWICE = 2 * SIZE\n")
     assert uses(other, "module", ("SIZE",)) == (3,)

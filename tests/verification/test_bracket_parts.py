@@ -31,6 +31,7 @@ from vdsm_pin.proof.layouts import (
 )
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import RANK
+from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -651,14 +652,16 @@ def test_a_profile_has_each_link_by_itself(feed: Feed | None) -> None:
 
 def test_sinks_hear_of_every_interval_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """In chunks that follow one another, and the proof says how many were sent."""
-    monkeypatch.setattr(clearance, "CHUNK", 7)
+    monkeypatch.setattr(clearance, "CHUNK_VALUES", 29 * (2 * BLOCK + 1))
     ball = Sphere("ball", np.array([1.0, 0.3, 0.0]), 0.1)
     asked = PlanningProblem("p", ARM, Scene((ball,)), None, 0.0, np.eye(4))
-    for rows in (1, 2, 8, 30):
+    for rows, most in ((3 * BLOCK, 2 * BLOCK), (1, 7), (2, 7), (8, 7), (30, 7)):
         still, chunks = np.zeros((rows, 8)), list[ClearanceChunk]()
         rest = np.zeros(rows)
         motion = Trajectory(rest > 0, rest, np.linspace(0, 0.1, rows), still, still)
         proof = prove_clearance(asked, motion, ErrorBox(), (chunks.append,))
+        monkeypatch.setattr(clearance, "CHUNK", 7)
+        assert max(len(chunk.lower) for chunk in chunks) == min(most, max(1, rows - 1))
         assert proof.sent == proof.n_intervals == max(1, rows - 1)
         heard = [c.first_interval + k for c in chunks for k in range(len(c.lower))]
         assert heard == [*range(proof.n_intervals)]

@@ -116,7 +116,8 @@ def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
 def test_culling_skips_only_what_is_far(shape: str) -> None:
     obstacle = obstacle_of(shape, np.random.default_rng(10 + SHAPES.index(shape)))
     problem, trajectory = problem_with(obstacle), trajectory_of(60)
-    reach = coal_reach(problem)
+    reach = problem.required_clearance + HRM8.most_radius
+    assert coal_reach(problem) == reach
     arm = CoalArm(ROBOT, problem, links=False)
 
     def link(chunk: CoalDistances) -> list[int]:

@@ -172,8 +172,7 @@ def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check
     if path.closed and left and back <= same:
         back = max(back, float(total.max()) - path.length)
         first = int(np.argmax(total > path.length + same))
-    moment = on[first] if on.size else 0
-    kept = back <= same
+    kept = back <= same  # as where nothing is drawn
     verdict = Verdict.CERTIFIED if kept else Verdict.REFUTED
     return (
         Check(
@@ -184,7 +183,7 @@ def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check
             limit=same,
             unit="m",
             where="" if kept else "drawn backwards or again from here",
-            moment=float("nan") if kept else float(moment),
+            moment=float("nan") if kept else float(on[first]),
         ),
     )
 
