@@ -247,3 +247,28 @@ def test_an_interval_is_halved_only_where_its_bound_is_beyond_the_cone(
         case.forge()
         assert case.reason() == ""
         assert (len(ends) == 2 * (5 + 4)) is whole
+
+
+@pytest.mark.parametrize("row", [0, 2, 4])
+@pytest.mark.parametrize("kind", ["target", "direction", "directions"])
+def test_another_aim_is_refused(kind: str, row: int, tmp_path: Path) -> None:
+    """A microradian outside of the cone at one row, in the problem that is forged."""
+    case, cone = Looking(tmp_path, 5), 30.0
+    case.ask(cone, kind)
+    case.look()
+    axis = case.centres[row, -1] - case.centres[row, -2]
+    axis /= np.linalg.norm(axis)
+    aside = np.cross(axis, [0.0, 0.6, 0.8])
+    aside /= np.linalg.norm(aside)
+    aim = axis + np.tan(np.deg2rad(cone) + 1e-6) * aside
+    if kind == "directions":
+        case.aims[kind][row] = aim.tolist()
+    else:
+        case.aims[kind] = (case.tips[row] + aim if kind == "target" else aim).tolist()
+    case.ask(cone, kind)
+    case.forge()
+    assert "the last link looks" in case.reason()
+    if kind == "directions":  # those of the other rows are as they were
+        assert case.reason().startswith(f"interval {max(row - 1, 0)}: ")
+        found = float(case.reason().split()[-3])
+        assert found == pytest.approx(cone + np.rad2deg(1e-6), abs=1e-9)
