@@ -129,6 +129,20 @@ def test_bags_without_trajectories_are_told(tmp_path: Path) -> None:
             read_bag(bag)
 
 
+def test_recorded_states_are_rows_at_times_from_the_first() -> None:
+    def state(names: str, q: list[float], sec: int, nanosec: int) -> SimpleNamespace:
+        stamp = SimpleNamespace(sec=sec, nanosec=nanosec)
+        header = SimpleNamespace(stamp=stamp)
+        return SimpleNamespace(name=[*names], position=np.array(q), header=header)
+
+    states = [state("ab", [1.0, 2.0], 7, 5), state("ba", [3.0, 4.0], 9, 250_000_005)]
+    found = of_message(Place.of("t", bags._states(states)))
+    assert found.names == ("a", "b")
+    assert found.q.tolist() == [[1.0, 2.0], [4.0, 3.0]]
+    assert found.times is not None
+    assert found.times.tolist() == [0.0, 2.25]
+
+
 @pytest.mark.parametrize("ending", [".json", ".yaml"])
 def test_what_is_wrong_with_messages_is_said(
     tmp_path: Path, robot: Robot, ending: str

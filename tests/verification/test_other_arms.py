@@ -206,6 +206,10 @@ def test_what_is_wrong_with_another_arm_is_named(tmp_path: Path) -> None:
     two.write_text(text + text[text.index("  - {name: mate") :])
     with pytest.raises(InvalidFile, match=r"others.*two obstacles are named"):
         read_problem(two)
+    both = tmp_path / "both.yaml"
+    both.write_text(text.replace("name: mate, ", "name: mate, robot: {urdf: r.urdf}, "))
+    with pytest.raises(InvalidFile, match="has both or none of manipulator and robot"):
+        read_problem(both)
     bad = tmp_path / "bad.yaml"
     odd = "name: mate, manipulator: {link_radii: 3, "
     bad.write_text(text.replace("name: mate, manipulator: {", odd))
