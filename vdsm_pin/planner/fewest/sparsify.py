@@ -73,6 +73,8 @@ def _without(judge: Judge, corners: Corners, joint: int, way: int) -> Corners:
     rows, trial = 1 + np.flatnonzero(on[1:]), corners.offsets.copy()
     bent = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
     rows, before = rows[bent[:, joint]], bent[bent[:, joint]].sum(axis=1)
+    if not len(rows):
+        return corners
     trial[rows] = in_line(arm, tips[rows], trial[rows], joint, way)
     after = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
     rows = rows[after.sum(axis=1) < before]

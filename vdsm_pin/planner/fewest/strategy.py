@@ -256,11 +256,12 @@ def _written(
     assert outcome.found is not None
     judge, arm = outcome.judge, problem.manipulator
     corners = outcome.found.corners
-    if not isinstance(outcome.found, Searched):
+    grown = not isinstance(outcome.found, Searched)
+    if grown:
         corners = sparser(judge, corners)
     corners = shortcut(judge, corners, weights)
-    if weights == FEWEST:
-        # What is straighter has more knees to spare.
+    # What is straighter has more knees to spare. A roadmap has few but for an aim.
+    if weights == FEWEST and (grown or problem.path.pointing is not None):
         corners = sparser(judge, corners)
     corners = lifted(judge, straightened(judge, corners))
     turn = problem.planned_row_change
