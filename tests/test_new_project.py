@@ -1,5 +1,7 @@
 """`vdsm new` makes folders that the other commands take as they are."""
 
+import json
+import shlex
 import shutil
 from pathlib import Path
 
@@ -35,11 +37,16 @@ def test_what_is_made_is_read_under_its_name(
 @pytest.mark.parametrize(
     "kind", ["snake", pytest.param("port", marks=pytest.mark.slow)]
 )
-def test_what_is_made_is_planned_and_certified(tmp_path: Path, kind: str) -> None:
-    new_project(tmp_path / "mine", kind)
-    problem, out = tmp_path / "mine" / "problem.yaml", tmp_path / "out"
+def test_what_is_made_is_planned_as_is_told_and_certified(
+    tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "mine"
+    with pytest.raises(SystemExit):
+        main(["new", str(folder), "--from", kind, "--json"])
+    program, *words = shlex.split(json.loads(capsys.readouterr().out)["next"])
+    assert (program, words[-1]) == ("vdsm", str(folder / "out"))
     with pytest.raises(SystemExit) as ended:
-        main(["plan", str(problem), "--out", str(out)])
+        main(words)
     assert ended.value.code == 0
 
 

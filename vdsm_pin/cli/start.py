@@ -50,7 +50,7 @@ def new(
     words = ["vdsm", "plan", str(folder / "problem.yaml")]
     if kind == "robot":
         words = ["vdsm", "verify", words[-1], "--trajectory", str(folder / "plan.csv")]
-    then = f"{shlex.join(words)} --out out"
+    then = shlex.join([*words, "--out", str(folder / "out")])
     text = f"made {folder} with {', '.join(files)}; next:\n  {then}"
     answer.tell(text, folder=folder, files=files, next=then)
 
