@@ -84,6 +84,24 @@ def test_single_results_compare_too(tmp_path: Path) -> None:
     assert change.worse
 
 
+@pytest.mark.parametrize(
+    ("rows", "reason", "words"),
+    [
+        ((), "", "no rows"),
+        ((ROW, ROW), "", "two of one folder"),
+        ((ROW,), "x" * 200_000, "field larger than field limit"),
+    ],
+)
+def test_a_summary_that_no_batch_writes_is_refused(
+    rows: tuple[BatchRow, ...], reason: str, words: str, tmp_path: Path
+) -> None:
+    """No rows are no result without a difference."""
+    longer = [row.model_copy(update={"reason": reason}) for row in rows]
+    one = folder(tmp_path / "one", *longer)
+    with pytest.raises(InvalidFile, match=f"one: cannot be read: .*{words}"):
+        compare_folders(one, one)
+
+
 def test_other_folders_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidFile, match="neither"):
         compare_folders(tmp_path, tmp_path)

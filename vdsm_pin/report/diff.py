@@ -1,5 +1,6 @@
 """What changed between two result folders: better, worse, newly refuted."""
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -120,7 +121,12 @@ def _rows(folder: Path) -> dict[str, BatchRow]:
     summary, single = folder / "summary.csv", folder / "verification.json"
     try:
         if summary.is_file():
-            return {row.folder: row for row in read_summary(summary)}
+            rows = read_summary(summary)
+            found = {row.folder: row for row in rows}
+            if not rows or len(found) < len(rows):
+                message = "it has no rows, or two of one folder"
+                raise ValueError(message)
+            return found
         if single.is_file():
             file = VerificationFile.model_validate_json(single.read_bytes())
             return {file.problem: batch_row(file.problem, "", file)}
@@ -129,7 +135,7 @@ def _rows(folder: Path) -> dict[str, BatchRow]:
         key = ".".join(str(part) for part in first["loc"]) or "content"
         problem = f"{key}: {first['msg']}; was it written by this version of vdsm?"
         raise InvalidFile(file=folder, problem=problem) from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise InvalidFile(file=folder, problem=f"cannot be read: {error}") from error
     what = "holds neither summary.csv nor verification.json"
     raise InvalidFile(file=folder, problem=what)
