@@ -1,6 +1,7 @@
 """How triangles close, function by function; oracle: dictionaries and loops."""
 
 from collections import Counter
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -214,3 +215,7 @@ def test_covers_are_told_of_the_triangles_alone() -> None:
     assert mesh.covers.tolist() == [signed, single, signed]
     assert (SOLID | SIGNED | SINGLE) == SOLID + SIGNED + SINGLE
     assert mesh.closed and mesh.corners.shape == (4, 3, 3)
+    for count, words in ((1, "an edge has"), (2, "2 edges have")):
+        left = replace(mesh, n_open=count)
+        assert not left.closed
+        assert left.why_open == f"is not closed: {words} no partner"

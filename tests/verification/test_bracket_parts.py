@@ -567,6 +567,9 @@ def test_a_row_of_clearance_is_its_worst_pair(late: bool) -> None:
             known = np.isfinite(least.upper[k])
             assert row.moment == moment if known else np.isnan(row.moment)
             assert row.deeper == (values[k] < -0.001 * k)
+            # Nobody looked for when it is lost.
+            assert (row.too_close_intervals, row.too_close_stretches) == (0, 0)
+            assert np.isnan([row.first_moment, row.last_moment]).all()
     assert len(seen) == 3
 
 

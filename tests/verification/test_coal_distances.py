@@ -140,6 +140,22 @@ def test_culling_skips_only_what_is_far(shape: str) -> None:
     assert {i for _, i in seen} == set(range(8)), "every pair at least once"
 
 
+@pytest.mark.parametrize("bounds", [1 << 17, 8, 40])
+def test_far_pairs_are_measured_where_they_come_nearest(
+    bounds: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once each, at the row that is farthest along the rail, in parts or at once."""
+    monkeypatch.setattr("vdsm_pin.verification.coal_arm.CHUNK_BOUNDS", bounds)
+    ball = solids.Sphere("far", np.array([9.0, 0.0, 0.0]), 0.1)
+    along, still = np.array([0.0, 0.2, 0.1, 0.4, 0.3, 0.0, 0.1]), np.zeros((7, 8))
+    motion = Trajectory(np.zeros(7), np.zeros(7), along, still, still)
+    arm = CoalArm(ROBOT, problem_with(ball), links=False)
+    found = list(arm.near(motion, 0.0))
+    pairs = np.concatenate([one.pair for one in found])
+    assert sorted(arm.pairs.one[pairs].tolist()) == list(range(8))
+    assert {float(m) for one in found for m in one.moment} == {3.0}
+
+
 def test_rows_close_to_each_other_are_seen_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

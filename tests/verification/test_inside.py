@@ -20,19 +20,23 @@ from oracles.closed_solids import (
     spoiled,
 )
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate, main
 from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.inputs import input_notes
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
+from vdsm_pin.verification.inside import mesh_notes
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot
@@ -437,3 +441,16 @@ def test_a_closed_path_may_be_drawn_on_without_leaving_it(tmp_path: Path) -> Non
     ]
     rows.write_text("\n".join([header, *lines, ""]))
     check_accepted(tmp_path, path, rows)
+
+
+@pytest.mark.parametrize(("gap", "told"), [(5e-11, 0), (5e-10, 1)])
+def test_gaps_are_told_where_they_are_more_than_rounding(gap: float, told: int) -> None:
+    """Of a box whose diagonal is 139 m, a part in 10^12 is 1.4e-10 m."""
+    corners = np.asarray(trimesh.creation.box(np.full(3, 80.0)).triangles).copy()
+    corners[corners.mean(axis=1)[:, 2] > 0.0] += [0.0, 0.0, gap]
+    faces = np.arange(len(corners) * 3).reshape(-1, 3)
+    mesh = Mesh("hall", corners.reshape(-1, 3), faces)
+    scene = Scene((mesh,))
+    problem = PlanningProblem("p", built_in("hrm8"), scene, None, 0.0, np.eye(4))
+    assert mesh.closed_mesh.closed and mesh.closed_mesh.gap > 0.5 * gap
+    assert len(mesh_notes(problem)) == told
