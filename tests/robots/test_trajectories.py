@@ -129,6 +129,18 @@ def test_bags_without_trajectories_are_told(tmp_path: Path) -> None:
             read_bag(bag)
 
 
+@pytest.mark.parametrize("key", ["positions", "velocities", "accelerations"])
+@pytest.mark.parametrize("lacking", [0, 1])
+def test_what_some_points_have_all_must_have(key: str, lacking: int) -> None:
+    """Else straight lines would be judged in place of smooth pieces."""
+    keys = "positions", "velocities", "accelerations"
+    points = [{key: [0.5] for key in keys} | {"time_from_start": k} for k in range(2)]
+    assert of_message(Place.of("t", {"joint_names": ["a"], "points": points}))
+    del points[lacking][key]
+    with pytest.raises(InvalidFile, match=rf"points\[{lacking}\].{key}"):
+        of_message(Place.of("t", {"joint_names": ["a"], "points": points}))
+
+
 def test_recorded_states_are_rows_at_times_from_the_first() -> None:
     def state(names: str, q: list[float], sec: int, nanosec: int) -> SimpleNamespace:
         stamp = SimpleNamespace(sec=sec, nanosec=nanosec)
