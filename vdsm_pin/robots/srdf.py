@@ -1,12 +1,14 @@
 """A SRDF: pairs that need not be held apart, groups of joints, how the robot stands."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal, TypeAlias, cast
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.source import read_text
+from vdsm_pin.io.tables import listed
 
 MAX_BYTES: Final = 16 << 20
 
@@ -57,21 +59,23 @@ class Srdf:
         return InvalidFile(file=self._path, problem=problem)
 
     def disabled(self) -> dict[frozenset[str], str]:
-        """Pairs of links that it does not hold apart, with its reason.
-
-        Raises:
-            InvalidFile: If it names what is no link.
-        """
+        """Pairs of links that it does not hold apart, with its reason."""
         found = {}
+        for pair, element in self._disabled():
+            reason = element.get("reason", "no reason given")
+            found[pair] = f"left out by the SRDF: {reason}"
+        return found
+
+    def notes(self) -> Iterator[str]:
+        """What it disables of links that there are not: as MoveIt, nothing."""
+        named = set().union(*(pair for pair, _ in self._disabled()))
+        if unknown := sorted(named - self._links):
+            yield f"disable_collisions of the SRDF names no links: {listed(unknown)}"
+
+    def _disabled(self) -> Iterator[tuple[frozenset[str], ET.Element]]:
         for element in self._root.iter("disable_collisions"):
             pair = element.get("link1", ""), element.get("link2", "")
-            for name in pair:
-                if name not in self._links:
-                    problem = f"disable_collisions names {name!r}, which is no link"
-                    raise self._invalid(problem)
-            reason = element.get("reason", "no reason given")
-            found[frozenset(pair)] = f"left out by the SRDF: {reason}"
-        return found
+            yield frozenset(pair), element
 
     def base(self) -> Base | None:
         """Its planar or floating virtual joint; None where the root link stands.

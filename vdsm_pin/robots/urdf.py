@@ -46,6 +46,7 @@ def read_robot(files: RobotFiles) -> Robot:
     bodies = _bodies(links, document, reader)
     tree = Tree(tuple(reader.joints))
     disabled = more.disabled() if more is not None else {}
+    unknown = more.notes() if more is not None else ()
     held, left_out = held_pairs(tree, bodies, disabled, more is None)
     return Robot(
         name=document.get("name", urdf.stem),
@@ -58,7 +59,7 @@ def read_robot(files: RobotFiles) -> Robot:
         left_out=left_out,
         base=base,
         solids=solids,
-        notes=(*reader.notes, *links.notes, *_not_judged(document)),
+        notes=(*reader.notes, *unknown, *links.notes, *_not_judged(document)),
         more_files=(*included, *links.meshes(document)),
         covers=links.covers,
     )
