@@ -137,7 +137,7 @@ def test_names_and_remarks_may_be_in_any_encoding_and_lines_end_anyhow(
 def test_an_obj_line_goes_on_behind_a_backslash_but_not_behind_one_in_a_remark(
     tmp_path: Path,
 ) -> None:
-    text = "# C:\\parts\\\nv 0 0 \\\n0\nv 1 0 0 # x \\\nv 0 1 0\nf 1 \\\n 2 \\\n3"
+    text = "# C:\\parts\\\nv 0 0 \\\n0\nv 1 0 0 # x \\\nv 0 1 0\nf 1 \\\n 2\\\n3"
     mesh = read_mesh(write(tmp_path, "a.obj", text))
     corners = mesh.vertices[mesh.triangles][0].tolist()
     assert corners == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]

@@ -63,8 +63,8 @@ class MeshSize:
 
     @property
     def shown(self) -> str:
-        """The size in words: 12 x 3 x 0.6 mm."""
-        sides = " x ".join(f"{side:.4g}" for side in self.extents * self.scale)
+        """The size in words, 12 x 3 x 0.6 mm; nothing scales what is not stated."""
+        sides = " x ".join(f"{side:.4g}" for side in self.extents)
         return f"{sides} {self.frame.unit}"
 
     @property
