@@ -9,7 +9,14 @@ import pytest
 
 from vdsm_pin.geometry import mesh_gaps
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.closed_meshes import SIGNED, SINGLE, SOLID, ClosedMesh, _heights
+from vdsm_pin.geometry.closed_meshes import (
+    SIGNED,
+    SINGLE,
+    SOLID,
+    ClosedMesh,
+    _heights,
+    _Search,
+)
 from vdsm_pin.geometry.mesh_edges import (
     Covers,
     attached,
@@ -20,6 +27,7 @@ from vdsm_pin.geometry.mesh_edges import (
     welded,
 )
 from vdsm_pin.geometry.mesh_gaps import SLANT, off_segment, seams_along
+from vdsm_pin.tolerances import TOLERANCES
 
 Edge = tuple[int, int]
 
@@ -202,6 +210,18 @@ def test_seams_join_an_edge_and_the_corners_on_it(
     for most, told in ((looked_at, len(expected)), (looked_at - 1, 0)):
         monkeypatch.setattr(mesh_gaps, "MANY", most)
         assert len(seams_along(vertices, edges, at, 0.05).beside) == told
+
+
+@pytest.mark.parametrize("size", [1e-2, 1.0, 100.0])
+def test_triangles_without_area_are_those_flat_for_their_mesh(size: float) -> None:
+    """On both sides of the limit; along an edge as long as the mesh."""
+    limit = TOLERANCES.mesh_flat * size
+    corners = np.array([
+        [[0.0, 0.0, 0.0], [size, 0.0, 0.0], [0.5 * size, height, 0.0]]
+        for height in (0.0, 0.5 * limit, 2.0 * limit, 1e-3 * size)
+    ])  # fmt: skip
+    search = _Search(corners.reshape(-1, 3), corners)
+    assert search.flat.tolist() == [True, True, False, False]
 
 
 def test_covers_are_told_of_the_triangles_alone() -> None:

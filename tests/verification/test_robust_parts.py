@@ -242,3 +242,25 @@ def test_the_pairs_left_open_that_are_nearest_are_searched(
     assert swept == [(0, 7)]
     offsets = [errors[k] for k in asked]
     assert found == [np.abs(one[1:]).max() for one in offsets if one is not None]
+
+
+@pytest.mark.parametrize("end", [1, STRETCH, 2 * STRETCH + 9])
+def test_stretches_are_asked_and_then_the_whole(
+    end: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The weakest interval decides, wherever it is."""
+    rng, box = np.random.default_rng(end), ErrorBox(base=0.5)
+    survived, asked = rng.uniform(0.01, 0.3, end), list[tuple[int, int]]()
+
+    def holds(errors: ErrorBox, first: int, last: int) -> bool:
+        assert errors.base == 0.5
+        asked.append((first, last))
+        return errors.joint <= survived[first:last].min()
+
+    proof = SimpleNamespace(n_intervals=end, holds=holds)
+    monkeypatch.setattr(robust, "YesOrNoProof", lambda *_: proof)
+    told: Any = None
+    found = robust._largest_of_all(told, told, box, LARGEST, NO_LIMIT)
+    assert survived.min() - STEP <= found <= survived.min()
+    stretches = [(k, min(k + STRETCH, end)) for k in range(0, end, STRETCH)]
+    assert {*asked} == {*stretches, (0, end)} and asked[-1] == (0, end)
