@@ -28,7 +28,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import in_mm
 
 TIP_TOLERANCE: Final = 0.3
-"""How far the tip may be from its way off the path, over its radius; [-]."""
+"""How far the tip may be from its way off the path, over the body's radius; [-]."""
 AHEAD: Final = (3, 8, 20)
 """Layers ahead of a place of the path by way of which it is come to."""
 TURNING: Final = 12
@@ -163,7 +163,7 @@ class _Search:
             before = len(route) - 1
             tolerance = np.zeros(before + len(path))
             tolerance[1:before] = (
-                TIP_TOLERANCE * self.judge.problem.manipulator.axis_radii[-1]
+                TIP_TOLERANCE * self.judge.problem.manipulator.most_radius
             )
             tips = np.vstack([route, path[1:]])
             layers = Layers(tips, tolerance, *self._aims(k, before, tips))
