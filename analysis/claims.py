@@ -35,7 +35,6 @@ from vdsm_pin.report.motion_facts import changed_angles, motion_facts
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "claims.md"
@@ -141,8 +140,7 @@ def avoidance(runs: Runs) -> tuple[Claim, Claim]:
     for scene in BLOCKED:
         run = runs(scene, "paper")
         kept.append(f"{scene} {run.verification.min_clearance * MM_PER_M:.2f} mm")
-        robot = load_robot(run.problem.manipulator)
-        judged = verify(run.problem.under(box), run.trajectory, robot)
+        judged = verify(run.problem.under(box), run.trajectory)
         worst = min(one.clearance for one in judged.counterexamples)
         lost.append(f"{scene} {worst * MM_PER_M:.1f} mm")
         error = np.rad2deg(touching_error(run.refinement))
@@ -275,7 +273,7 @@ def iterations(runs: Runs) -> tuple[Claim, list[str]]:
     for scene in SCENES:
         problem = runs.problem(scene)
         with counted() as counts:
-            found = plan_and_verify(problem, "paper", load_robot(problem.manipulator))
+            found = plan_and_verify(problem, "paper")
         rows = found.plan.trajectory.n_samples
         solves = f"{counts.solves} ({counts.rows} / {rows})"
         lines.append((scene, solves, counts.sections, len(found.rounds)))
@@ -315,9 +313,8 @@ def generality(per_family: int) -> tuple[Claim, list[str]]:
 def draws_all(file: Path) -> bool:
     """Whether the paper's rule draws the whole path, certified."""
     problem = read_problem(file)
-    robot = load_robot(problem.manipulator)
     try:
-        found = plan_and_verify(problem, "paper", robot)
+        found = plan_and_verify(problem, "paper")
     except Infeasible:
         return False
     return found.verification.verdict is Verdict.CERTIFIED

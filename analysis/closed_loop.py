@@ -24,7 +24,6 @@ from vdsm_pin.simulation.closed_loop import Simulation, simulate
 from vdsm_pin.simulation.folder import Cleared, SimulationFile, summary
 from vdsm_pin.simulation.settings import Kick, Settings
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.robot_model import load_robot
 
 SCENES = ("free", "obs1", "obs2", "obs2-small", "obs3")
 STRATEGIES = ("paper", "fewest", "sturdiest")
@@ -70,8 +69,7 @@ def run(scene: str, strategy: str, settings: Settings) -> Ran:
 
 def _run(scene: str, strategy: str, settings: Settings) -> Ran:
     problem = read_problem(f"paper/{scene}")
-    robot = load_robot(problem.manipulator)
-    trajectory = plan_and_verify(problem, strategy, robot).plan.trajectory
+    trajectory = plan_and_verify(problem, strategy).plan.trajectory
     found = simulate(problem.manipulator, trajectory, settings)
     file = summary(problem, trajectory, found, settings, "")
     return Ran(problem, trajectory, found, file)

@@ -23,7 +23,6 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 SCENES: Final = ("obs1", "obs2-small", "obs3")
@@ -65,7 +64,7 @@ def arrival(scene: str, strategy: str) -> str:
     """The verdict of the plan for an obstacle that comes in and rests."""
     motion = {"times_s": [0, 3], "positions": [[0, FROM_MM, 0], [0, 0, 0]]}
     problem = with_motion(scene, motion)
-    found = plan_and_verify(problem, strategy, load_robot(problem.manipulator))
+    found = plan_and_verify(problem, strategy)
     return str(found.verification.verdict)
 
 
@@ -76,7 +75,7 @@ def bears(scene: str, motion: Trajectory, sway_mm: float, **changes: Any) -> boo
     sides = [[0, sway_mm * (-1) ** k, 0] for k in range(len(times))]
     moves = {"times_s": times.tolist(), "positions": sides}
     problem = with_motion(scene, moves, **changes)
-    verdict = verify(problem, motion, load_robot(problem.manipulator)).verdict
+    verdict = verify(problem, motion).verdict
     return verdict is Verdict.CERTIFIED
 
 
@@ -93,8 +92,7 @@ def most_sway(scene: str, motion: Trajectory, **changes: Any) -> float:
 def line(scene: str, strategy: str) -> Line:
     """One plan, made for the resting obstacle."""
     problem = read_problem(f"paper/{scene}")
-    robot = load_robot(problem.manipulator)
-    plan = plan_and_verify(problem, strategy, robot).plan.trajectory
+    plan = plan_and_verify(problem, strategy).plan.trajectory
     timed = replace(plan, times=ROW_S * np.arange(plan.n_samples))
     return Line(
         scene,

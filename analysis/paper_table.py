@@ -21,7 +21,6 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 
 SCENES: Final = ("free", "obs1", "obs2", "obs2-small", "obs3")
@@ -198,8 +197,7 @@ def table() -> list[Row]:
     rows = reach_rows()
     for scene in SCENES:
         problem = read_problem(f"paper/{scene}")
-        robot = load_robot(problem.manipulator)
-        rows += rows_of(scene, plan_and_verify(problem, "paper", robot))
+        rows += rows_of(scene, plan_and_verify(problem, "paper"))
     return rows
 
 

@@ -23,7 +23,6 @@ from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.robot_model import load_robot
 
 SCENES: Final = ("obs1", "obs2", "obs2-small")
 GROWTHS: Final = (0.0, 0.02, 0.04, 0.08)
@@ -134,7 +133,7 @@ def one_line(runs: Runs, scene: str, number: int) -> OneLine:
 
     with patch.object(side_rules, "_lines", only):
         try:
-            found = plan_and_verify(problem, "paper", load_robot(problem.manipulator))
+            found = plan_and_verify(problem, "paper")
         except Infeasible:
             return OneLine(scene, LINES[number], None, None)
     rows = found.plan.trajectory

@@ -24,7 +24,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.cable_check import check_cables
 from vdsm_pin.verification.coal_check import check_coal
 from vdsm_pin.verification.fk import check_fk
-from vdsm_pin.verification.robot_model import load_robot
+from vdsm_pin.verification.pinocchio_arm import load_arm
 
 PROBLEM = "paper/obs1"
 
@@ -48,7 +48,7 @@ def cases(problem: PlanningProblem, rows: int) -> dict[str, Callable[[], object]
     joints = motion.x0, motion.alpha, motion.theta
     centres = joint_centres(arm, *joints)
     lengths = cable_lengths(arm, motion.alpha, motion.theta)
-    robot = load_robot(arm)
+    robot = load_arm(arm)
     return {
         "centres from angles": lambda: joint_centres(arm, *joints),
         "angles from centres": lambda: joint_angles(arm, centres),
@@ -62,7 +62,7 @@ def cases(problem: PlanningProblem, rows: int) -> dict[str, Callable[[], object]
         ),
         "check: Pinocchio": lambda: check_fk(robot, problem, motion),
         "check: cables": lambda: check_cables(problem, motion),
-        "check: Coal": lambda: check_coal(robot, problem, motion),
+        "check: Coal": lambda: check_coal(problem, motion),
     }
 
 

@@ -25,8 +25,8 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 PROBLEMS = ("free", "obs1", "obs2", "obs3")
@@ -61,7 +61,7 @@ def measure(repeats: int) -> Results:
 def _peer(plan: Plan, repeats: int = 3) -> dict[str, float]:
     """The peer's time a waypoint on the way of a plan, and what the verifier says."""
     problem, tip = plan.problem, plan.tip_path
-    robot, clearance = load_robot(problem.manipulator), link_clearance(problem)
+    robot, clearance = load_arm(problem.manipulator), link_clearance(problem)
     goal = Wanted(tip.points[1:], tip.path_m[1:], tip.on_path[1:])
     begin = time.process_time()
     try:
@@ -75,7 +75,7 @@ def _peer(plan: Plan, repeats: int = 3) -> dict[str, float]:
         MICRO / motion.n_samples,
         warm_up=False,
     )
-    passed = verify(problem, motion, robot).verdict is Verdict.CERTIFIED
+    passed = verify(problem, motion).verdict is Verdict.CERTIFIED
     return spans | {"completes": 1.0, "certified": float(passed)}
 
 

@@ -19,13 +19,11 @@ from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.verification.robot_model import load_robot
 
 
 def steps_of(name: str) -> PaperSteps:
     problem = read_problem(name)
-    robot = load_robot(problem.manipulator)
-    found = plan_and_verify(problem, "paper", robot).plan.steps
+    found = plan_and_verify(problem, "paper").plan.steps
     assert found is not None
     return found
 

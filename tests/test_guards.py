@@ -25,7 +25,6 @@ from vdsm_pin.verification import coal_check
 from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.robot_model import load_robot
 
 
 def calls(run: Callable[[], object]) -> int:
@@ -111,6 +110,6 @@ def test_coal_is_asked_where_it_adds_evidence(
         return measure(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(measuring, "measure", counting)
-    coal_check.check_coal(load_robot(problem.manipulator), problem, planned)
+    coal_check.check_coal(problem, planned)
     pairs = planned.n_samples * problem.manipulator.n_links
     assert 8 + 21 <= asked <= 21 + 0.4 * pairs

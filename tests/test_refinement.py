@@ -26,7 +26,6 @@ from vdsm_pin.verification import coal_check, coal_missing
 from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 
 
@@ -49,9 +48,7 @@ def test_missing_clearance_between_waypoints_is_added_to_the_margin(
 
     monkeypatch.setattr(refinement, "strategy", lambda name: close)
     problem = short("obs3")
-    result = refinement.plan_and_verify(
-        problem, "paper", load_robot(problem.manipulator)
-    )
+    result = refinement.plan_and_verify(problem, "paper")
     assert result.verification.verdict is Verdict.CERTIFIED
     found_by = {one.measured_by for ended in result.rounds for one in ended.adjustments}
     assert "proof" in found_by
@@ -68,8 +65,7 @@ def test_margins_reach_beyond_what_a_plan_keeps_unasked() -> None:
     """Errors take what it kept, so that a margin within that asks for nothing."""
     problem = read_problem("paper/obs1")
     problem = replace(problem, errors=ErrorBox(joint=np.deg2rad(0.1)))
-    robot = load_robot(problem.manipulator)
-    result = refinement.plan_and_verify(problem, "fewest", robot)
+    result = refinement.plan_and_verify(problem, "fewest")
     assert result.verification.verdict is Verdict.CERTIFIED
     assert result.verification.errors == problem.errors
     ended = result.rounds[0]
@@ -93,7 +89,7 @@ def test_a_plan_that_cannot_be_certified_is_not_handed_out(
     monkeypatch.setattr(refinement, "strategy", lambda name: blind)
     problem = short("obs3")
     with pytest.raises(NoPlanFound, match="too near"):
-        refinement.plan_and_verify(problem, "paper", load_robot(problem.manipulator))
+        refinement.plan_and_verify(problem, "paper")
 
 
 def test_reasons_of_the_planner_pass_through() -> None:
@@ -101,7 +97,7 @@ def test_reasons_of_the_planner_pass_through() -> None:
     start = replace(problem.path, start=np.array([3.126, 0.0, 2.5]))
     problem = replace(problem, tip_path=start)
     with pytest.raises(Infeasible, match="beyond the reach"):
-        refinement.plan_and_verify(problem, "paper", load_robot(problem.manipulator))
+        refinement.plan_and_verify(problem, "paper")
 
 
 def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
@@ -119,7 +115,7 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
         return replace(blind, rivals=(lean, wide))
 
     monkeypatch.setattr(refinement, "strategy", lambda name: boasting)
-    result = refinement.plan_and_verify(task, "any", load_robot(task.manipulator))
+    result = refinement.plan_and_verify(task, "any")
     errors = []
     for m in (0.0, 0.03):
         motion = plan_fewest(task, link_clearance(task), m).trajectory
@@ -150,13 +146,12 @@ def test_with_a_coal_that_reports_less_the_plan_keeps_so_much_more(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = replace(short("obs3"), required_clearance=0.010)
-    robot = load_robot(problem.manipulator)
-    honest = refinement.plan_and_verify(problem, name, robot)
+    honest = refinement.plan_and_verify(problem, name)
     assert not honest.rounds[0].adjustments
     before = honest.verification.min_clearance
     error = 0.005 + before - problem.required_clearance
     monkeypatch.setattr(coal_missing, "CoalArm", off_by(-error))
-    careful = refinement.plan_and_verify(problem, name, robot)
+    careful = refinement.plan_and_verify(problem, name)
     assert careful.verification.min_clearance >= before + 0.005
     first = careful.rounds[0]
     assert first.verdict is None
@@ -172,9 +167,8 @@ def test_what_keeps_much_anyway_keeps_more_where_coal_finds_it_missing(
     name: str, error: float, again: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = replace(short("obs3"), required_clearance=0.010)
-    robot = load_robot(problem.manipulator)
     monkeypatch.setattr(coal_missing, "CoalArm", off_by(-error))
-    careful = refinement.plan_and_verify(problem, name, robot)
+    careful = refinement.plan_and_verify(problem, name)
     assert careful.verification.min_clearance >= problem.required_clearance + error
     assert (len(careful.rounds) > 1) == again
 
@@ -187,11 +181,10 @@ def test_with_a_coal_that_reports_more_no_plan_is_returned(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = short("obs3")
-    robot = load_robot(problem.manipulator)
     for module in (coal_missing, coal_check):
         monkeypatch.setattr(module, "CoalArm", off_by(0.005))
     with pytest.raises(NoPlanFound, match="Coal"):
-        refinement.plan_and_verify(problem, name, robot)
+        refinement.plan_and_verify(problem, name)
 
 
 @pytest.mark.parametrize("name", STRATEGIES)
@@ -199,21 +192,19 @@ def test_without_coal_there_is_no_plan(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = short("obs3")
-    robot = load_robot(problem.manipulator)
     monkeypatch.setitem(sys.modules, "coal", None)
     with pytest.raises(ImportError):
-        refinement.plan_and_verify(problem, name, robot)
+        refinement.plan_and_verify(problem, name)
 
 
 def test_only_the_link_that_coal_names_gets_a_margin() -> None:
     """A blunder of the planner at one link: the others keep what they had."""
     problem = short("obs3")
-    robot = load_robot(problem.manipulator)
     plan = plan_paper(problem, link_clearance(problem), 0.0)
     margins = np.zeros((8, 1))
-    assert by_coal(robot, plan, margins, NO_LIMIT) == ()
+    assert by_coal(plan, margins, NO_LIMIT) == ()
     tight = replace(problem, required_clearance=0.0037)
-    found = by_coal(robot, replace(plan, problem=tight), margins, NO_LIMIT)
+    found = by_coal(replace(plan, problem=tight), margins, NO_LIMIT)
     links = {one.link for one in found}
     assert links
     assert links < set(range(1, 9))
@@ -225,11 +216,10 @@ def test_only_the_link_that_coal_names_gets_a_margin() -> None:
 
 def test_plans_keep_their_change_per_row_and_less_where_the_problem_says_so() -> None:
     problem = short("obs3")
-    robot = load_robot(problem.manipulator)
     for limit, most in ((None, 5.0), (10.0, 5.0), (1.0, 1.0)):
         change = None if limit is None else np.deg2rad(limit)
         asked = replace(problem, max_row_change=change)
-        result = refinement.plan_and_verify(asked, "fewest", robot)
+        result = refinement.plan_and_verify(asked, "fewest")
         (row,) = [c for c in result.verification.checks if "change of a" in c.name]
         assert row.verdict is Verdict.CERTIFIED
         assert row.limit == pytest.approx(np.deg2rad(most))
@@ -251,8 +241,7 @@ def with_open_box(
 
 
 def planned(problem: PlanningProblem, name: str = "fewest") -> refinement.Refinement:
-    robot = load_robot(problem.manipulator)
-    return refinement.plan_and_verify(problem, name, robot)
+    return refinement.plan_and_verify(problem, name)
 
 
 @pytest.mark.parametrize("name", ["paper", "fewest"])
@@ -289,11 +278,10 @@ def test_an_approach_that_is_not_read_is_told(
     name: str, strategy: str, why: str
 ) -> None:
     problem = read_problem(f"paper/{name}")
-    robot = load_robot(problem.manipulator)
     for approach in Approach:
         path = replace(problem.path, approach=approach)
         asked = replace(problem, tip_path=path)
-        notes = refinement.plan_and_verify(asked, strategy, robot).plan.notes
+        notes = refinement.plan_and_verify(asked, strategy).plan.notes
         said = [note for note in notes if "is not read" in note]
         assert len(said) == bool(why and approach is not Approach.SHORTEST)
         assert all(why in note and repr(approach.value) in note for note in said)

@@ -31,7 +31,6 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 TEXT = """vdsm_problem: 1
 name: door
@@ -55,7 +54,7 @@ def problem_of(folder: Path, hinge: float = 1400.0) -> PlanningProblem:
 
 def test_the_arm_waits_until_the_door_is_open(tmp_path: Path) -> None:
     problem = problem_of(tmp_path)
-    found = plan_and_verify(problem, "fewest", load_robot(problem.manipulator))
+    found = plan_and_verify(problem, "fewest")
     assert found.verification.verdict is Verdict.CERTIFIED
     assert found.verification.problem is not problem  # which promises small steps
     assert found.verification.problem.scene.moving
@@ -74,7 +73,7 @@ def test_the_arm_waits_until_the_door_is_open(tmp_path: Path) -> None:
 def test_a_door_that_swings_over_the_start_has_no_plan(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, hinge=500.0)
     with pytest.raises(NoPlanFound, match="where all comes to rest, but not proved"):
-        plan_and_verify(problem, "fewest", load_robot(problem.manipulator))
+        plan_and_verify(problem, "fewest")
 
 
 def test_a_time_limit_before_the_proof_of_the_wait_is_told(
@@ -88,8 +87,7 @@ def test_a_time_limit_before_the_proof_of_the_wait_is_told(
 
     monkeypatch.setattr(refinement, "waited", late)
     with pytest.raises(OutOfTime, match="600 s came first; a motion was found, but"):
-        robot = load_robot(problem.manipulator)
-        plan_and_verify(problem, "fewest", robot, deadline=deadline)
+        plan_and_verify(problem, "fewest", deadline=deadline)
 
 
 def test_what_knows_no_time_refuses(tmp_path: Path) -> None:

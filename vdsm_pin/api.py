@@ -27,7 +27,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.records import ArmVerification, Verification
-from vdsm_pin.verification.robot_model import load_robot
 
 if TYPE_CHECKING:  # few need robots or repair
     from vdsm_pin.repair.rounds import Repaired
@@ -75,8 +74,8 @@ def plan(
 
     expect(problem, PlanningProblem, "read_problem(path)")
     expect(strategy, str, "'fewest'")
-    deadline, robot = Deadline.after(time_limit), load_robot(problem.manipulator)
-    return plan_and_verify(problem, strategy, robot, deadline=deadline).plan
+    deadline = Deadline.after(time_limit)
+    return plan_and_verify(problem, strategy, deadline=deadline).plan
 
 
 @overload

@@ -15,7 +15,6 @@ from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.coal_missing import coal_missing
 from vdsm_pin.verification.records import ArmVerification
-from vdsm_pin.verification.robot_model import RobotModel
 
 OVERSHOOT: Final = 1.25
 """The margin grows by this times what is missing, as a plan with a larger margin also
@@ -44,12 +43,11 @@ class Adjustment:
 
 
 def by_coal(
-    robot: RobotModel, plan: Plan, margins: FloatArray, deadline: Deadline
+    plan: Plan, margins: FloatArray, deadline: Deadline
 ) -> tuple[Adjustment, ...]:
     """Raise margins where Coal measures less than required at a waypoint.
 
     Args:
-        robot: The arm in Pinocchio and Coal.
         plan: With the problem whose clearance it has to keep.
         margins: Those of the plan, shape (N, n_obstacles); [m].
         deadline: When to give up.
@@ -66,7 +64,7 @@ def by_coal(
             problem, margins, float(one.waypoint), one.link, one.obstacle,
             ("Coal", one.distance, one.distance),
         )
-        for one in coal_missing(robot, problem, plan.trajectory, deadline)
+        for one in coal_missing(problem, plan.trajectory, deadline)
     )  # fmt: skip
 
 

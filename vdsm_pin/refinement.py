@@ -32,7 +32,6 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ArmVerification, Verdict
-from vdsm_pin.verification.robot_model import RobotModel
 from vdsm_pin.verification.robust import (
     largest_joint_error,
     refuted_joint_error,
@@ -92,7 +91,6 @@ class Refinement:
 def plan_and_verify(
     problem: PlanningProblem,
     strategy_name: str,
-    robot: RobotModel,
     *,
     deadline: Deadline = NO_LIMIT,
 ) -> Refinement:
@@ -103,7 +101,6 @@ def plan_and_verify(
     Args:
         problem: What is asked.
         strategy_name: A name in `STRATEGIES`.
-        robot: The arm as Pinocchio and Coal see it.
         deadline: When planning and proving must have ended.
 
     Returns:
@@ -116,14 +113,13 @@ def plan_and_verify(
     """
     scene = problem.scene
     if not scene.moving:
-        return _plan_at_rest(problem, strategy_name, robot, deadline)
+        return _plan_at_rest(problem, strategy_name, deadline)
     still = replace(problem, scene=scene.at_time(scene.rest_time))
-    found = _plan_at_rest(still, strategy_name, robot, deadline)
+    found = _plan_at_rest(still, strategy_name, deadline)
     plan = waited(found.plan, problem)
     verification = verify(
         _promised(problem),
         plan.trajectory,
-        robot,
         deadline=deadline,
         centres=plan.centres,
     )
@@ -138,7 +134,6 @@ def plan_and_verify(
 def _plan_at_rest(
     problem: PlanningProblem,
     strategy_name: str,
-    robot: RobotModel,
     deadline: Deadline,
 ) -> Refinement:
     """`plan_and_verify` of a problem in which no obstacle moves."""
@@ -159,14 +154,13 @@ def _plan_at_rest(
             before = [f"before that {_story(rounds)}"] if rounds else []
             error.args = ("; ".join([*known.notes, str(error), *before]),)
             raise
-        adjustments = by_coal(robot, plan, margins, deadline)
+        adjustments = by_coal(plan, margins, deadline)
         if adjustments:
             rounds.append(_measured(margins, adjustments))
         else:
             verification = verify(
                 promised,
                 plan.trajectory,
-                robot,
                 deadline=deadline,
                 centres=plan.centres,
             )

@@ -14,7 +14,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.verification.records import ArmVerification
-from vdsm_pin.verification.robot_model import RobotModel, load_robot
 
 SCENES: Final = ("obs1", "obs2", "obs2-small", "obs3", "free")
 """The paper's environments; obs2 in both readings."""
@@ -88,7 +87,6 @@ class Runs:
         """Use the problem files' spacing of waypoints, or another one [m]."""
         self._spacing = spacing
         self._made: dict[tuple[str, str], Run] = {}
-        self._robots: dict[str, RobotModel] = {}
 
     def problem(self, scene: str) -> PlanningProblem:
         """The problem of a scene."""
@@ -106,9 +104,7 @@ class Runs:
         key = (scene, strategy)
         if key not in self._made:
             problem = self.problem(scene)
-            arm = problem.manipulator
-            robot = self._robots.setdefault(arm.name, load_robot(arm))
-            found = plan_and_verify(problem, strategy, robot)
+            found = plan_and_verify(problem, strategy)
             self._made[key] = Run(scene, strategy, found)
         return self._made[key]
 

@@ -23,8 +23,8 @@ from vdsm_pin.report.motion_facts import changed_angles, motion_facts
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import ArmVerification, Verdict
-from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.verify import verify
 
 WALL: Final = 6.0
@@ -109,9 +109,7 @@ class ProcessorTime(Deadline):
         return replace(self, end=self.end - seconds, spent=self.spent - seconds)
 
 
-def by_strategy(
-    problem: PlanningProblem, robot: RobotModel, name: str, limit: float
-) -> Judged:
+def by_strategy(problem: PlanningProblem, name: str, limit: float) -> Judged:
     """One of this package's strategies, refined where the first plan is not certified.
 
     The proof of the first plan is not counted as planning, later ones are.
@@ -120,26 +118,24 @@ def by_strategy(
     clearance = within_time(link_clearance(problem), ProcessorTime.after(limit))
     plan = strategy(name)(problem, clearance, 0.0)
     plan_s = time.process_time() - begin
-    verification = verify(problem, plan.trajectory, robot)
+    verification = verify(problem, plan.trajectory)
     if verification.verdict is not Verdict.CERTIFIED:
         begin = time.process_time()
         deadline = ProcessorTime.after(limit)
-        result = plan_and_verify(problem, name, robot, deadline=deadline)
+        result = plan_and_verify(problem, name, deadline=deadline)
         plan_s = time.process_time() - begin
         plan, verification = result.plan, result.verification
     return Judged(plan.trajectory, verification, plan_s)
 
 
-def by_reference(
-    problem: PlanningProblem, robot: RobotModel, name: str, limit: float
-) -> Judged:
+def by_reference(problem: PlanningProblem, name: str, limit: float) -> Judged:
     """One of the references, judged as it comes."""
     follow = reference(name)
     begin = time.process_time()
     clearance = within_time(link_clearance(problem), ProcessorTime.after(limit))
-    trajectory = follow(problem, robot, clearance)
+    trajectory = follow(problem, load_arm(problem.manipulator), clearance)
     plan_s = time.process_time() - begin
-    return Judged(trajectory, verify(problem, trajectory, robot), plan_s)
+    return Judged(trajectory, verify(problem, trajectory), plan_s)
 
 
 def whole_or_nothing(problem: PlanningProblem) -> PlanningProblem:
@@ -157,11 +153,10 @@ def attempt(file: Path, key: tuple[str, int], name: str, limit: float) -> Outcom
         limit: Processor time of planning; [s].
     """
     problem = whole_or_nothing(read_problem(file))
-    robot = load_robot(problem.manipulator)
     plan = by_reference if name in REFERENCES else by_strategy
     begin = time.process_time()
     try:
-        judged = plan(problem, robot, name, limit)
+        judged = plan(problem, name, limit)
     except Exception as error:  # noqa: BLE001 - a crash is an outcome to be counted
         spent = time.process_time() - begin
         reason = str(error) or type(error).__name__

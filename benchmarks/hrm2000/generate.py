@@ -20,7 +20,6 @@ from benchmarks.hrm2000.motions import DraftRejected
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.verification.records import ArmVerification, Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 VERSION: Final = 3
@@ -56,7 +55,7 @@ def verified(path: Path) -> ArmVerification:
     """The judgement of a problem's witness, both read from their files."""
     problem = read_problem(path)
     trajectory = read_trajectory(witness_of(path), problem.manipulator)
-    return verify(problem, trajectory, load_robot(problem.manipulator))
+    return verify(problem, trajectory)
 
 
 def _remove(path: Path) -> None:

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "analysis"))
 import table1_parameters as tables
 
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.verification.robot_model import load_robot
+from vdsm_pin.verification.pinocchio_arm import load_arm
 
 HRM8 = built_in("hrm8")
 
@@ -28,7 +28,7 @@ def poses(n: int) -> list[tuple[float, np.ndarray, np.ndarray]]:
 
 @pytest.mark.parametrize("table", [tables.by_table_1, tables.by_traditional])
 def test_both_tables_give_the_joint_centres_of_pinocchio(table) -> None:  # type: ignore[no-untyped-def]
-    robot = load_robot(HRM8)
+    robot = load_arm(HRM8)
     for x0, alpha, theta in poses(200):
         expected = robot.joint_centres(np.array([x0]), alpha[None], theta[None])[0]
         np.testing.assert_allclose(

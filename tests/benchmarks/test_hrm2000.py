@@ -29,7 +29,6 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 CURVE = tip_curve([Bend(0.2, 0.4, 0.9, 0.3), Bend(0.1, 0.5, 0.8, 2.5)])
@@ -137,12 +136,11 @@ def test_a_witness_is_certified_and_one_that_is_spoiled_is_not(
     assert verified(path).verdict is Verdict.CERTIFIED
     problem = read_problem(path)
     assert problem.path.required_coverage == 1.0
-    robot = load_robot(problem.manipulator)
     motion = read_trajectory(witness_of(path), problem.manipulator)
     half = motion.part(0, motion.n_samples - 5)
-    assert verify(problem, half, robot).verdict is not Verdict.CERTIFIED
+    assert verify(problem, half).verdict is not Verdict.CERTIFIED
     turned = replace(motion, alpha=motion.alpha + np.deg2rad(3.0))
-    assert verify(problem, turned, robot).verdict is not Verdict.CERTIFIED
+    assert verify(problem, turned).verdict is not Verdict.CERTIFIED
 
 
 @pytest.mark.parametrize("name", TWINS)
@@ -209,5 +207,4 @@ def test_a_last_link_that_looks_elsewhere_is_a_fault(tmp_path: Path) -> None:
     tighter = replace(problem, tip_path=replace(problem.path, pointing=narrow))
     (fault,) = sample(tighter, motion).faults
     assert "past its aim" in fault
-    robot = load_robot(problem.manipulator)
-    assert verify(tighter, motion, robot).verdict is Verdict.REFUTED
+    assert verify(tighter, motion).verdict is Verdict.REFUTED

@@ -20,12 +20,12 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 FREE = read_problem("paper/free")
-ROBOT = load_robot(FREE.manipulator)
+ROBOT = load_arm(FREE.manipulator)
 
 
 def ahead(problem: PlanningProblem = FREE) -> PlanningProblem:
@@ -43,7 +43,7 @@ def test_methods_without_obstacles_draw_the_free_square_and_change_every_angle(
 ) -> None:
     coarse = replace(FREE, tip_path=replace(FREE.path, spacing=0.05))
     motion = reference(name)(coarse, ROBOT, link_clearance(coarse))
-    assert verify(coarse, motion, ROBOT).verdict is Verdict.CERTIFIED
+    assert verify(coarse, motion).verdict is Verdict.CERTIFIED
     assert (np.abs(motion.joints[-1, 1:]) > 1e-4).any()
 
 
@@ -51,13 +51,13 @@ def test_a_method_that_looks_at_no_obstacle_is_refuted_by_the_judge() -> None:
     problem = read_problem("paper/obs1")
     problem = replace(problem, tip_path=replace(problem.path, spacing=0.05))
     motion = reference("pseudo-inverse")(problem, ROBOT, link_clearance(problem))
-    assert verify(problem, motion, ROBOT).verdict is Verdict.REFUTED
+    assert verify(problem, motion).verdict is Verdict.REFUTED
 
 
 def test_the_arm_lies_on_the_trail_of_its_tip() -> None:
     problem = ahead()
     motion = reference("follow-the-leader")(problem, ROBOT, link_clearance(problem))
-    assert verify(problem, motion, ROBOT).verdict is Verdict.CERTIFIED
+    assert verify(problem, motion).verdict is Verdict.CERTIFIED
     centres = joint_centres(problem.manipulator, motion.x0, motion.alpha, motion.theta)
     trail = centres[:, -1]
     for place in centres[-1, :-1]:
@@ -116,7 +116,7 @@ def test_a_swarm_reaches_a_path_ahead() -> None:
     problem = replace(problem, tip_path=replace(problem.path, spacing=0.1))
     follow = reference("particle-swarm")
     motion = follow(problem, ROBOT, link_clearance(problem))
-    row = verify(problem, motion, ROBOT).checks
+    row = verify(problem, motion).checks
     assert all(c.verdict is Verdict.CERTIFIED for c in row if "waypoints" in c.name)
 
 

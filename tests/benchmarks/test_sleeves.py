@@ -15,7 +15,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 
@@ -41,7 +40,7 @@ def test_a_push_along_the_rail_is_a_certified_plan_at_the_limits() -> None:
         motion = Trajectory(drawn, way, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
         psi = link_angles(motion.alpha, motion.theta).max()
         assert psi == pytest.approx(SHARE * arm.max_link_angle) or psi == 0.0
-        result = verify(one.problem, motion, load_robot(arm))
+        result = verify(one.problem, motion)
         assert result.verdict is Verdict.CERTIFIED
         assert result.coverage >= 1.0 - 1e-9
 

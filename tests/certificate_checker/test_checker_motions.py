@@ -19,7 +19,6 @@ from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 Rng = np.random.Generator
@@ -92,7 +91,7 @@ class Motion:
         file = read_problem(self.problem)
         arm = file.manipulator
         self.motion = read_trajectory(self.rows, arm)
-        found = verify(file.under(errors), self.motion, load_robot(arm))
+        found = verify(file.under(errors), self.motion)
         if found.verdict.value != "certified":
             return False
         hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()))

@@ -23,7 +23,6 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.pointing import NAME
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")
@@ -91,7 +90,7 @@ class Looking:
     def look(self, errors: ErrorBox = NO_ERRORS) -> float:
         """Write a certificate; the proved bound of the angle; [deg]."""
         file, rows = read_problem(self.problem), read_trajectory(self.rows, ARM)
-        found = verify(file.under(errors), rows, load_robot(ARM))
+        found = verify(file.under(errors), rows)
         row = next(check for check in found.checks if check.name == NAME)
         assert found.verdict.value == "certified", found.checks
         hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()))

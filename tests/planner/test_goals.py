@@ -19,7 +19,6 @@ from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 START = Posture(np.array([0.0, 0.0, 0.0]))
@@ -55,7 +54,7 @@ def to(goal: Posture, *obstacles: Obstacle, start: Posture = START) -> PlanningP
 
 
 def planned(task: PlanningProblem, name: str = "fewest") -> Refinement:
-    found = plan_and_verify(task, name, load_robot(ARM))
+    found = plan_and_verify(task, name)
     assert found.verification.verdict is Verdict.CERTIFIED
     assert found.plan.problem is task
     assert not found.plan.trajectory.on_path.any()
@@ -104,7 +103,7 @@ def test_a_goal_in_an_obstacle_is_refused_and_says_from_which_end() -> None:
     goal = posture(bent(0.4, 0.3))
     ball = Sphere("ball", goal.tip, 0.1)
     with pytest.raises(NoPlanFound) as refused:
-        plan_and_verify(to(goal, ball), "fewest", load_robot(ARM))
+        plan_and_verify(to(goal, ball), "fewest")
     assert "planned back from the goal" in str(refused.value)
     assert "'ball'" in str(refused.value)
 
@@ -114,10 +113,8 @@ def test_the_arm_goes_home_the_way_it_came() -> None:
     path = DesiredPath(START.tip, points, home=True)
     scene = Scene(tuple(wall(0.12)))
     task = PlanningProblem("home", ARM, scene, path, 0.0035, np.eye(4))
-    found = plan_and_verify(task, "fewest", load_robot(ARM))
-    there = plan_and_verify(
-        replace(task, tip_path=replace(path, home=False)), "fewest", load_robot(ARM)
-    )
+    found = plan_and_verify(task, "fewest")
+    there = plan_and_verify(replace(task, tip_path=replace(path, home=False)), "fewest")
     assert found.verification.verdict is Verdict.CERTIFIED
     assert found.verification.coverage == pytest.approx(1.0)
     rows, first = found.plan.trajectory, there.plan.trajectory
@@ -177,4 +174,4 @@ def test_home_is_a_word_of_the_file(tmp_path: Path) -> None:
 
 def test_an_unknown_strategy_is_refused_for_a_goal_too() -> None:
     with pytest.raises(UnknownName):
-        plan_and_verify(to(START), "luck", load_robot(ARM))
+        plan_and_verify(to(START), "luck")

@@ -14,7 +14,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 NAME = "follow-the-leader"
@@ -46,13 +45,13 @@ def test_joints_lie_on_the_tips_curve_and_the_motion_is_certified() -> None:
     way = arc(1.2, 60.0)
     ahead = way[-1] + np.outer([0.1, 0.3], [0.5, np.sqrt(0.75), 0.0])
     problem = task(way, ahead)
-    found = plan_and_verify(problem, NAME, load_robot(ARM))
+    found = plan_and_verify(problem, NAME)
     assert found.verification.verdict is Verdict.CERTIFIED
     assert found.verification.coverage == pytest.approx(1.0)
     curve = np.vstack([[-9.0, 0.0, 0.0], np.zeros(3), way, ahead])
     joints = found.plan.centres[:, 1:].reshape(-1, 3)
     assert from_line(joints, curve).max() < 1e-9
-    again = plan_and_verify(problem, NAME, load_robot(ARM)).plan
+    again = plan_and_verify(problem, NAME).plan
     np.testing.assert_array_equal(again.centres, found.plan.centres)
 
 
@@ -60,28 +59,26 @@ def test_a_corner_too_sharp_names_the_joint_and_the_tip() -> None:
     """Square round a corner: a short link behind a long one bends by 90 deg."""
     insertion = np.array([[1.0, 0.0, 0.0], [1.0, 1.2, 0.0]])
     with pytest.raises(NoPlanFound, match=r"joint \d would bend by \d+\.\d deg"):
-        plan_and_verify(
-            task(insertion, np.array([[1.0, 1.4, 0.0]])), NAME, load_robot(ARM)
-        )
+        plan_and_verify(task(insertion, np.array([[1.0, 1.4, 0.0]])), NAME)
 
 
 def test_a_rail_too_short_is_said() -> None:
     problem = task(np.zeros((0, 3)), np.array([[1.0, 0.0, 0.0]]))
     short = replace(ARM, base_range=(-4.0, -3.0))
     with pytest.raises(NoPlanFound, match="leave its rail"):
-        plan_and_verify(replace(problem, manipulator=short), NAME, load_robot(short))
+        plan_and_verify(replace(problem, manipulator=short), NAME)
 
 
 def test_what_is_in_the_way_is_refused_not_handed_out() -> None:
     way = arc(1.2, 60.0)
     ball = Sphere("ball", way[20], 0.05)
     with pytest.raises(NoPlanFound):
-        plan_and_verify(task(way[:-1], way[-1:], ball), NAME, load_robot(ARM))
+        plan_and_verify(task(way[:-1], way[-1:], ball), NAME)
 
 
 def test_a_bent_start_is_left_along_its_own_curve() -> None:
     way = arc(1.2, 60.0)
-    first = plan_and_verify(task(way[:-1], way[-1:]), NAME, load_robot(ARM)).plan
+    first = plan_and_verify(task(way[:-1], way[-1:]), NAME).plan
     row = first.trajectory.n_samples // 2
     joints, tip = first.trajectory.joints[row], first.centres[row, -1]
     rest = [p for p in way if p[0] > tip[0] + 0.05]
@@ -89,6 +86,6 @@ def test_a_bent_start_is_left_along_its_own_curve() -> None:
         tip, np.array(rest[-1:]), start_joints=joints, insertion=np.array(rest[:-1])
     )
     problem = PlanningProblem("bent", ARM, Scene(()), path, 0.0035, np.eye(4))
-    found = plan_and_verify(problem, NAME, load_robot(ARM))
+    found = plan_and_verify(problem, NAME)
     assert found.verification.verdict is Verdict.CERTIFIED
     np.testing.assert_allclose(found.plan.trajectory.joints[0], joints, atol=1e-12)

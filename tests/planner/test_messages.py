@@ -10,7 +10,6 @@ from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.units import in_mm
-from vdsm_pin.verification.robot_model import load_robot
 
 PROBLEM = """
 vdsm_problem: 1
@@ -55,7 +54,7 @@ def test_the_unit_of_the_file_changes_no_message(tmp_path: Path, strategy: str) 
     for unit in ("mm", "m"):
         problem = read_problem(written(tmp_path, unit))
         with pytest.raises(Infeasible) as refused:
-            plan_and_verify(problem, strategy, load_robot(problem.manipulator))
+            plan_and_verify(problem, strategy)
         said.append(str(refused.value))
     assert said[0] == said[1]
     assert not re.search(r"\d m\b", said[0])

@@ -29,15 +29,12 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.repair.arm import repair_arm
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.coal_arm import CoalArm
-from vdsm_pin.verification.robot_model import load_robot
-
-ROBOT = load_robot(built_in("hrm8"))
 
 
 @cache
 def planned(name: str) -> tuple[PlanningProblem, Trajectory]:
     problem = read_problem(name)
-    return problem, plan_and_verify(problem, "fewest", ROBOT).plan.trajectory
+    return problem, plan_and_verify(problem, "fewest").plan.trajectory
 
 
 def beside(name: str, row: int, link: int, gap: float) -> PlanningProblem:
@@ -68,7 +65,7 @@ def test_larger_clearance_is_reached(name: str) -> None:
     assert rows.joints[0].tolist() == motion.joints[0].tolist()
     assert found.given[0] == 0
     assert 0.0 < found.moved.max() < 0.2
-    near = CoalArm(ROBOT, asked, links=False).near(finely(rows), 0.02)
+    near = CoalArm(asked, links=False).near(finely(rows), 0.02)
     least = min(chunk.distance.min(initial=1.0) for chunk in near)
     assert least >= asked.required_clearance - 5e-6
 

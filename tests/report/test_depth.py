@@ -15,7 +15,6 @@ from vdsm_pin.report.html import write_report
 from vdsm_pin.report.reason import reason
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.verification.records import Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 
@@ -27,7 +26,7 @@ def beside_a_box(gap: float) -> Verification:
     zero, links = np.zeros(1), np.zeros((1, problem.manipulator.n_links))
     rows = Trajectory(zero.astype(bool), zero, zero, links, links)
     problem = replace(problem, scene=Scene((box,)))
-    return verify(problem, rows, load_robot(problem.manipulator))
+    return verify(problem, rows)
 
 
 @pytest.mark.parametrize("gap", [-0.3, -0.001, 0.001, 0.03])

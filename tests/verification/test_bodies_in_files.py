@@ -32,7 +32,6 @@ from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 LENGTHS = [400.0, 300.0, 300.0]
@@ -82,8 +81,8 @@ class Files:
     def verify(self, errors: ErrorBox | None = None) -> Verification:
         asked = read_problem(self.problem)
         rows = read_trajectory(self.trajectory, asked.manipulator)
-        robot, box = load_robot(asked.manipulator), errors or ErrorBox()
-        return verify(asked.under(box), rows, robot)
+        box = errors or ErrorBox()
+        return verify(asked.under(box), rows)
 
     def check(self, found: Verification) -> Outcome:
         named = read_problem(self.problem).sha256, sha256(self.trajectory.read_bytes())

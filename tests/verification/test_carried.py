@@ -30,7 +30,6 @@ from vdsm_pin.verification.records import (
     Verdict,
     Verification,
 )
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = {
@@ -72,7 +71,7 @@ def judged(problem: Path, rows: Path) -> tuple[PlanningProblem, Verification]:
     file = read_problem(problem)
     arm = file.manipulator
     motion = read_trajectory(rows, arm)
-    return file, verify(file, motion, load_robot(arm))
+    return file, verify(file, motion)
 
 
 def certified(problem: Path, rows: Path) -> Path:
@@ -130,7 +129,7 @@ def test_coal_measures_every_approach_of_all_that_the_arm_has(tmp_path: Path) ->
         motion = Trajectory(
             none > 0, none, q[:, 0], q[:, 1::2], q[:, 2::2], times=[0, 1, 2]
         )
-        found = verify(problem, motion, load_robot(problem.manipulator))
+        found = verify(problem, motion)
         for near in found.approaches:
             pair = near.pair
             seen.add((pair.body, pair.obstacle or f"own {pair.other_body}".strip()))
@@ -534,8 +533,7 @@ def test_an_obstacle_may_be_named_like_a_part_of_a_mesh(tmp_path: Path) -> None:
     file = problem_in(tmp_path, {"bodies": [CAMERA]}, [post])
     problem = read_problem(file)
     motion = motion_in(tmp_path, np.zeros((2, 7)))
-    robot = load_robot(problem.manipulator)
-    found = verify(problem, read_trajectory(motion, problem.manipulator), robot)
+    found = verify(problem, read_trajectory(motion, problem.manipulator))
     names = {near.pair.obstacle for near in found.approaches}
     assert "post part 2" in names
     assert not [c for c in found.checks if c.where.startswith("not done")]

@@ -20,7 +20,6 @@ from vdsm_pin.verification import certificate_lines as lines_module
 from vdsm_pin.verification.certificate_file import certificate_schema
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 
@@ -31,7 +30,7 @@ def written(case: object, path: Path, box: ErrorBox | None = None) -> None:
     arm = file.manipulator
     trajectory = read_trajectory(case.trajectory, arm)
     box = box or ErrorBox(*case.writer.errors)
-    found = verify(file.under(box or ErrorBox()), trajectory, load_robot(arm))
+    found = verify(file.under(box or ErrorBox()), trajectory)
     kept = [
         c for c in found.checks if not c.name.startswith(("tip", "change", "joints at"))
     ]

@@ -18,7 +18,6 @@ from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.inside import check_inside, locate_start
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
 
@@ -242,7 +241,7 @@ def test_a_mesh_said_to_be_a_surface_is_judged_as_one_and_the_row_says_so() -> N
     mesh = replace(cube(5.0, np.zeros(3)), solid=False)
     problem = problem_with(mesh)
     assert check_inside(locate_start(problem, still)) == ()
-    rows = {row.name: row for row in verify(problem, still, load_robot(ARM)).checks}
+    rows = {row.name: row for row in verify(problem, still).checks}
     clearance = rows["clearance from obstacles"]
     assert clearance.verdict is Verdict.CERTIFIED
     assert "'cube' as a surface only" in clearance.where

@@ -32,7 +32,7 @@ from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_pairs import arm_shapes
 from vdsm_pin.verification.coal_shapes import Sides
-from vdsm_pin.verification.robot_model import RobotModel, load_robot
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm, load_arm
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 
 N_LINKS, RADIUS, SAMPLES = 3, 0.05, 1000
@@ -59,8 +59,8 @@ def arm() -> Manipulator:
 
 
 @cache
-def robot() -> RobotModel:
-    return load_robot(arm())
+def robot() -> PinocchioArm:
+    return load_arm(arm())
 
 
 def unit(vector: Any) -> FloatArray:
@@ -149,7 +149,7 @@ def by_coal(obstacle: scene.Obstacle, q: FloatArray) -> FloatArray:
     poses = np.tile(np.eye(3, 4), (len(q), N_LINKS + 2, 1, 1))
     poses[:, 1:-1] = robot().poses(q[:, 0], q[:, 1::2], q[:, 2::2])[:, :N_LINKS]
     row, link = (a.ravel() for a in np.indices((len(q), N_LINKS)))
-    shapes = arm_shapes(robot(), problem_of(obstacle), NO_LIMIT)
+    shapes = arm_shapes(problem_of(obstacle), NO_LIMIT)
     other = np.full(link.size, N_LINKS)
     found = shapes.distances(poses, Sides(row, link, other)).distance
     return found.reshape(len(q), N_LINKS)

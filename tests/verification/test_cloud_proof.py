@@ -22,7 +22,6 @@ from vdsm_pin.report.solids import detail, surface
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_check import check_coal
 from vdsm_pin.verification.records import ErrorBox, Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
@@ -67,12 +66,12 @@ def test_a_cloud_is_as_far_as_its_nearest_part(seed: int) -> None:
 def test_coal_agrees_about_clouds(seed: int) -> None:
     points = some_points(seed, 500)
     both = PointCloud("c", points, 0.004), Voxels("v", points + 0.5, TURN, HALF)
-    (row,) = check_coal(load_robot(ARM), problem(*both), motion(seed))
+    (row,) = check_coal(problem(*both), motion(seed))
     assert row.verdict is Verdict.CERTIFIED, row
     moved = PointCloud("c", points + 1e-3, 0.004)  # Coal is asked about another cloud
     asked = problem(moved, both[1])
     vars(asked)["packed"] = problem(*both).packed
-    (row,) = check_coal(load_robot(ARM), asked, motion(seed))
+    (row,) = check_coal(asked, motion(seed))
     assert row.verdict is Verdict.UNDECIDED
 
 

@@ -41,7 +41,6 @@ from vdsm_pin.verification.coal_hulls import (
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides, disagreement
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 RADIUS, HALF = 0.06, 0.24
 X_TO_Z = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -223,10 +222,10 @@ def test_inside_a_solid_mesh_coal_speaks_of_its_skin_only() -> None:
     problem = room(0.4 + HRM8.link_radius, True)
     still, x0 = np.zeros((1, 8)), np.full(1, 0.1)
     trajectory = Trajectory(np.zeros(1), np.zeros(1), x0, still, still)
-    arm = CoalArm(load_robot(HRM8), problem, links=False)
+    arm = CoalArm(problem, links=False)
     (found,) = arm.near(trajectory, np.inf)
     np.testing.assert_allclose(found.distance, np.full(8, 0.4), atol=1e-7)
-    (check,) = check_coal(load_robot(HRM8), problem, trajectory)
+    (check,) = check_coal(problem, trajectory)
     assert check.verdict is Verdict.CERTIFIED, "the distances to the skin agree"
     centres = joint_centres(HRM8, x0, still, still)
     assert (link_clearance(problem)(centres) < 0.0).all(), "and yet it is inside"

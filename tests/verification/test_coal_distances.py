@@ -27,11 +27,9 @@ from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_check import CoalLog, check_coal
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 HRM8 = built_in("hrm8")
-ROBOT = load_robot(HRM8)
 
 
 def unit(rng: np.random.Generator) -> np.ndarray:
@@ -103,7 +101,7 @@ def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
     rng = np.random.default_rng(SHAPES.index(shape))
     three = [replace(obstacle_of(shape, rng), name=f"number {k}") for k in range(3)]
     problem = problem_with(*three)
-    found = list(CoalArm(ROBOT, problem, links=False).near(trajectory_of(25), np.inf))
+    found = list(CoalArm(problem, links=False).near(trajectory_of(25), np.inf))
     assert sum(chunk.moment.size for chunk in found) == 25 * 8 * 3
     for chunk in found:
         assert chunk.disagreement.max() < 2e-7
@@ -118,7 +116,7 @@ def test_culling_skips_only_what_is_far(shape: str) -> None:
     problem, trajectory = problem_with(obstacle), trajectory_of(60)
     reach = problem.required_clearance + HRM8.most_radius
     assert coal_reach(problem) == reach
-    arm = CoalArm(ROBOT, problem, links=False)
+    arm = CoalArm(problem, links=False)
 
     def link(chunk: CoalDistances) -> list[int]:
         return arm.pairs.one[chunk.pair].tolist()
@@ -149,7 +147,7 @@ def test_far_pairs_are_measured_where_they_come_nearest(
     ball = solids.Sphere("far", np.array([9.0, 0.0, 0.0]), 0.1)
     along, still = np.array([0.0, 0.2, 0.1, 0.4, 0.3, 0.0, 0.1]), np.zeros((7, 8))
     motion = Trajectory(np.zeros(7), np.zeros(7), along, still, still)
-    arm = CoalArm(ROBOT, problem_with(ball), links=False)
+    arm = CoalArm(problem_with(ball), links=False)
     found = list(arm.near(motion, 0.0))
     pairs = np.concatenate([one.pair for one in found])
     assert sorted(arm.pairs.one[pairs].tolist()) == list(range(8))
@@ -164,7 +162,7 @@ def test_rows_close_to_each_other_are_seen_once(
     still = np.zeros((n, 8))
     along = np.concatenate([np.linspace(0.0, shift, n - 1000), np.full(1000, shift)])
     motion = Trajectory(np.zeros(n), np.zeros(n), along, still, still)
-    arm, room = CoalArm(ROBOT, ball_near_link_4(0.03), links=False), HRM8.most_radius
+    arm, room = CoalArm(ball_near_link_4(0.03), links=False), HRM8.most_radius
     of_link_4 = arm.pairs.one == 3
 
     def rows() -> list[int]:
@@ -185,7 +183,7 @@ def test_rows_close_to_each_other_are_seen_once(
 def test_verdict_and_count_of_an_honest_scene() -> None:
     rng = np.random.default_rng(3)
     problem = problem_with(*(obstacle_of(shape, rng) for shape in SHAPES))
-    (check,) = check_coal(ROBOT, problem, trajectory_of(40))
+    (check,) = check_coal(problem, trajectory_of(40))
     assert check.verdict is Verdict.CERTIFIED
     assert check.worst <= check.limit == TOLERANCES.coal_agreement
     pairs = 8 * len(SHAPES) + 21
@@ -218,7 +216,7 @@ def test_a_wrong_distance_is_noticed_on_both_sides(
         return Measured(found.distance + error, found.near, found.far)
 
     monkeypatch.setattr(measuring, "measure", lying)
-    (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
+    (check,) = check_coal(ball_near_link_4(0.01), STRAIGHT)
     expected = Verdict.CERTIFIED if excess < 1.0 else Verdict.UNDECIDED
     assert check.verdict is expected
 
@@ -235,7 +233,7 @@ def test_a_lie_leaves_the_whole_undecided(monkeypatch: pytest.MonkeyPatch) -> No
 
     for tell, verdict in ((honest, Verdict.CERTIFIED), (lying, Verdict.UNDECIDED)):
         monkeypatch.setattr(measuring, "measure", tell)
-        found = verify(problem, drawn, ROBOT)
+        found = verify(problem, drawn)
         row = next(c for c in found.checks if c.name == coal_check.COAL)
         assert row.verdict is verdict
         others = {c.verdict for c in found.checks if c is not row}
@@ -252,7 +250,7 @@ def test_no_answer_is_no_agreement(
     import coal
 
     monkeypatch.setattr(coal, "distance", lambda *arguments: answer)
-    (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
+    (check,) = check_coal(ball_near_link_4(0.01), STRAIGHT)
     assert check.verdict is Verdict.UNDECIDED
     assert check.worst == np.inf
 
@@ -266,7 +264,7 @@ def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(measuring, "measure", flipped)
     for gap in (0.01, -0.01):
-        (check,) = check_coal(ROBOT, ball_near_link_4(gap), STRAIGHT)
+        (check,) = check_coal(ball_near_link_4(gap), STRAIGHT)
         assert check.verdict is Verdict.UNDECIDED
         assert check.worst >= 0.01
 
@@ -281,10 +279,10 @@ def test_an_interval_proof_above_coal_is_noticed(k: int) -> None:
     # A bound of the interval, or of the whole motion where there is none.
     for column, bound in ((columns, interval[0]), (none, least)):
         proved = ProvedLowers(least, column, interval)
-        (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
+        (check,) = check_coal(problem, STRAIGHT, proved)
         assert check.verdict is Verdict.CERTIFIED
         bound[k] = 0.01 + 1e-5
-        (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
+        (check,) = check_coal(problem, STRAIGHT, proved)
         assert check.verdict is Verdict.UNDECIDED
         assert f"link {k + 1} and ball" in check.where
 
@@ -296,7 +294,7 @@ def test_poses_come_from_pinocchio_and_match_the_centres() -> None:
     for i in range(8):
         outward = centres[0, i] + np.array([0.0, 0.0, 5.0])
         problem = problem_with(solids.Sphere("far", outward, 0.1))
-        (chunk,) = CoalArm(ROBOT, problem, links=False).near(trajectory, np.inf)
+        (chunk,) = CoalArm(problem, links=False).near(trajectory, np.inf)
         expected = np.linalg.norm(
             centres[0, :-1]
             + _nearest(centres[0, :-1], centres[0, 1:], outward)[:, None]
@@ -321,8 +319,8 @@ def _nearest(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> np.ndarra
 def test_coal_stands_beside_every_closest_approach_and_measured_row() -> None:
     """At an approach Coal lies in its bracket, at a waypoint above the lower end."""
     problem = read_problem("paper/obs1")
-    plan = plan_and_verify(problem, "paper", ROBOT).plan
-    judged = verify(problem, plan.trajectory, ROBOT)
+    plan = plan_and_verify(problem, "paper").plan
+    judged = verify(problem, plan.trajectory)
     assert len(judged.approaches) == CLOSEST == 10
     gap = TOLERANCES.coal_agreement
     for near in judged.approaches:
@@ -341,7 +339,7 @@ def test_a_lie_of_coal_at_a_closest_approach_is_seen(
 ) -> None:
     """The answers at rows are honest."""
     problem = read_problem("paper/obs1")
-    plan = plan_and_verify(problem, "paper", ROBOT).plan
+    plan = plan_and_verify(problem, "paper").plan
     honest = CoalLog.answers
 
     def lying(*arguments: Any) -> Iterator[CoalDistances]:
@@ -349,7 +347,7 @@ def test_a_lie_of_coal_at_a_closest_approach_is_seen(
             yield replace(found, distance=found.distance + 2e-5)
 
     monkeypatch.setattr(CoalLog, "answers", lying)
-    judged = verify(problem, plan.trajectory, ROBOT)
+    judged = verify(problem, plan.trajectory)
     row = next(check for check in judged.checks if check.name == coal_check.COAL)
     assert row.verdict is Verdict.UNDECIDED
     assert row.moment in [near.moment for near in judged.approaches]
@@ -359,7 +357,7 @@ def test_of_a_mesh_around_the_arm_coal_knows_no_clearance() -> None:
     shell = trimesh.creation.box((20.0, 20.0, 20.0))
     problem = problem_with(solids.Mesh("shell", shell.vertices, shell.faces))
     still = Trajectory([0], [0], [0], np.zeros((1, 8)), np.zeros((1, 8)))
-    judged = verify(problem, still, ROBOT)
+    judged = verify(problem, still)
     assert judged.coal is not None
     assert judged.coal.pair.size > 0
     assert not any(judged.pairs[k].obstacle for k in judged.coal.pair)

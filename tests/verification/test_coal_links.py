@@ -19,7 +19,6 @@ from vdsm_pin.verification.coal_arm import CoalArm
 from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_check import check_coal
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 
 def coiling_arm(n_links: int) -> Manipulator:
@@ -66,11 +65,11 @@ def test_closed_form_is_inside_the_proved_bracket(size: float) -> None:
 def test_coal_agrees_on_every_pair(n_links: int) -> None:
     arm = coiling_arm(n_links)
     motion = trajectory_of(arm, 12, 1.3)
-    found = list(CoalArm(load_robot(arm), problem_for(arm)).near(motion, np.inf))
+    found = list(CoalArm(problem_for(arm)).near(motion, np.inf))
     count = sum(chunk.moment.size for chunk in found)
     assert count == 12 * (n_links - 1) * (n_links - 2) // 2
     assert max(chunk.disagreement.max() for chunk in found) < 1e-12
-    (check,) = check_coal(load_robot(arm), problem_for(arm), motion)
+    (check,) = check_coal(problem_for(arm), motion)
     assert check.verdict is Verdict.CERTIFIED
     assert (n_links - 1) * (n_links - 2) // 2 <= check.count <= count
 
@@ -80,7 +79,7 @@ def test_links_that_meet_are_measured_as_meeting() -> None:
     rings = np.random.default_rng(1).uniform(0.85, 1.0, (60, 8))
     still = np.zeros(60)
     motion = Trajectory(still, still, still, rings, np.zeros((60, 8)))
-    found = list(CoalArm(load_robot(arm), problem_for(arm)).near(motion, 0.0))
+    found = list(CoalArm(problem_for(arm)).near(motion, 0.0))
     meeting = np.concatenate([chunk.distance[chunk.upper < 0.0] for chunk in found])
     assert meeting.size > 20
     assert (meeting <= 0.0).all()
@@ -88,7 +87,7 @@ def test_links_that_meet_are_measured_as_meeting() -> None:
 
 def test_two_links_have_no_pair() -> None:
     arm = coiling_arm(2)
-    checks = check_coal(load_robot(arm), problem_for(arm), trajectory_of(arm, 3, 0.3))
+    checks = check_coal(problem_for(arm), trajectory_of(arm, 3, 0.3))
     assert checks == ()
 
 
@@ -107,6 +106,6 @@ def test_a_wrong_distance_is_noticed(
     monkeypatch.setattr(measuring, "measure", lying)
     arm = built_in("hrm8")
     motion = trajectory_of(arm, 5, 0.3)
-    (check,) = check_coal(load_robot(arm), problem_for(arm), motion)
+    (check,) = check_coal(problem_for(arm), motion)
     expected = Verdict.CERTIFIED if excess < 1.0 else Verdict.UNDECIDED
     assert check.verdict is expected

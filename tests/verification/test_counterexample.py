@@ -39,7 +39,6 @@ from vdsm_pin.verification.counterexample import (
     moments_of,
 )
 from vdsm_pin.verification.records import Counterexample, Pair, Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
@@ -208,12 +207,12 @@ def test_links_that_errors_bring_together_are_refuted() -> None:
 
 
 def test_the_row_says_refuted_and_the_nominal_motion_needs_no_counterexample() -> None:
-    problem, rows, robot = problem_with(ceiling(0.05)), motion(2), load_robot(ARM)
+    problem, rows = problem_with(ceiling(0.05)), motion(2)
     for box, verdict, count in (
         (ErrorBox(joint=0.0001), Verdict.CERTIFIED, 0),
         (ErrorBox(joint=0.01), Verdict.REFUTED, 1),
     ):
-        found = verify(problem.under(box), rows, robot)
+        found = verify(problem.under(box), rows)
         row = next(c for c in found.checks if c.name == "clearance from obstacles")
         assert row.verdict is verdict
         assert len(found.counterexamples) == count
@@ -221,7 +220,7 @@ def test_the_row_says_refuted_and_the_nominal_motion_needs_no_counterexample() -
     assert row.where.endswith("within the error box; the nominal motion is clear")
     assert found.nominal_clear
     touching = replace(problem, required_clearance=0.06)
-    found = verify(touching.under(ErrorBox(joint=0.01)), rows, robot)
+    found = verify(touching.under(ErrorBox(joint=0.01)), rows)
     assert found.counterexamples == ()
     assert found.verdict is Verdict.REFUTED
     assert not found.nominal_clear
@@ -229,14 +228,14 @@ def test_the_row_says_refuted_and_the_nominal_motion_needs_no_counterexample() -
 
 def test_the_nominal_motion_is_called_clear_only_where_all_of_it_is_proved() -> None:
     """Two open sheets beside the arm have a hull: away from it, or around it."""
-    rows, robot, box = motion(2), load_robot(ARM), ErrorBox(joint=0.01)
+    rows, box = motion(2), ErrorBox(joint=0.01)
     low = np.array([[0.0, 1.0, -2.0], [1.0, 1.0, -2.0], [0.0, 2.0, -2.0]])
     for other, clear in (([0.0, 0.1, -0.1], True), ([0.0, -3.0, 0.0], False)):
         corners = np.vstack([low, low + other])
         if not clear:
             corners += [0.0, 0.0, 2.0]
         sheets = Mesh("sheets", corners, np.array([[0, 1, 2], [3, 4, 5]]))
-        found = verify(problem_with(ceiling(0.05), sheets).under(box), rows, robot)
+        found = verify(problem_with(ceiling(0.05), sheets).under(box), rows)
         assert len(found.counterexamples) == 1
         assert found.nominal_clear is clear
         row = next(c for c in found.checks if c.name == "clearance from obstacles")

@@ -14,7 +14,6 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.first_contact import arm_contacts
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")
@@ -95,7 +94,7 @@ def test_links_that_meet_are_named_at_their_first_moment_and_at_their_worst() ->
     gaps = np.array([gap(t) for t in moments])
     lost = int(np.argmax(gaps < 0.03))
     assert gaps[0] > 0.01
-    result = verify(problem, motion, load_robot(arm))
+    result = verify(problem, motion)
     (row,) = [check for check in result.checks if check.name.startswith("clearance")]
     assert row.verdict is Verdict.REFUTED
     assert moments[lost - 1] - 1e-3 <= row.first_moment <= moments[lost] + 1e-3
@@ -109,7 +108,7 @@ def test_a_contact_has_its_end_and_its_intervals(n: int) -> None:
     there = np.concatenate([np.linspace(0, 1, n), np.linspace(1, 0, n)[1:]])
     motion, problem = advance(np.concatenate([there, there[1:]])), wall(0.3507)
     row = next(
-        one for one in verify(problem, motion, load_robot(ARM)).checks
+        one for one in verify(problem, motion).checks
         if one.name == "clearance from obstacles"
     )  # fmt: skip
     enters = 0.3407 * (n - 1)
@@ -127,7 +126,7 @@ def test_a_motion_that_ends_too_close_is_so_to_its_end() -> None:
         (advance(np.linspace(0, 1, 6)), 5),
         (advance(np.array([0.5])), 0),
     ):
-        judged = verify(wall(0.05), motion, load_robot(ARM))
+        judged = verify(wall(0.05), motion)
         (row,) = (one for one in judged.checks if "obstacles" in one.name)
         assert row.too_close_stretches == 1
         assert row.too_close_intervals == max(1, motion.n_samples - 1)

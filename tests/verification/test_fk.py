@@ -12,8 +12,8 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import fk
 from vdsm_pin.verification.fk import CHUNK, check_fk
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 HRM8 = built_in("hrm8")
@@ -40,7 +40,7 @@ def with_length(link: int, change: float) -> Manipulator:
 
 def test_the_arm_agrees_with_itself() -> None:
     n = 2 * CHUNK + 17
-    (check,) = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(n))
+    (check,) = check_fk(load_arm(HRM8), problem_for(HRM8), trajectory_of(n))
     assert check.verdict is Verdict.CERTIFIED
     assert check.count == 9 * n
     assert 0.0 <= check.worst < 1e-12
@@ -51,7 +51,7 @@ def test_the_arm_agrees_with_itself() -> None:
 def test_both_sides_of_the_tolerance(change: float, passes: bool) -> None:
     """A last link longer by so much moves the tip by as much and nothing else."""
     arm = with_length(8, change)
-    (check,) = check_fk(load_robot(HRM8), problem_for(arm), trajectory_of(40))
+    (check,) = check_fk(load_arm(HRM8), problem_for(arm), trajectory_of(40))
     assert (check.verdict is Verdict.CERTIFIED) == passes
     assert check.worst == pytest.approx(change, rel=1e-4)
     assert check.where.endswith("O9")
@@ -59,7 +59,7 @@ def test_both_sides_of_the_tolerance(change: float, passes: bool) -> None:
 
 def test_a_wrong_arm_is_refuted_where_it_is_worst() -> None:
     arm = with_length(3, 0.001)
-    (check,) = check_fk(load_robot(HRM8), problem_for(arm), trajectory_of(CHUNK + 40))
+    (check,) = check_fk(load_arm(HRM8), problem_for(arm), trajectory_of(CHUNK + 40))
     assert check.verdict is Verdict.REFUTED
     assert check.worst == pytest.approx(0.001)
 
@@ -71,7 +71,7 @@ def test_missing_evidence_is_no_pass(monkeypatch: pytest.MonkeyPatch) -> None:
         return centres
 
     monkeypatch.setattr(fk, "joint_centres", with_hole)
-    (check,) = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(5))
+    (check,) = check_fk(load_arm(HRM8), problem_for(HRM8), trajectory_of(5))
     assert check.verdict is Verdict.REFUTED
     assert check.worst == np.inf
     assert (check.moment, check.where) == (2.0, "joint centre O5")
@@ -80,7 +80,7 @@ def test_missing_evidence_is_no_pass(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_planned_centres_are_held_against_pinocchio() -> None:
     rows = trajectory_of(CHUNK + 40)
     centres = joint_centres(HRM8, rows.x0, rows.alpha, rows.theta).copy()
-    robot = load_robot(HRM8)
+    robot = load_arm(HRM8)
     _, check = check_fk(robot, problem_for(HRM8), rows, centres)
     assert (check.verdict, check.count) == (Verdict.CERTIFIED, 9 * rows.n_samples)
     assert 0.0 <= check.worst < 1e-12
@@ -88,7 +88,7 @@ def test_planned_centres_are_held_against_pinocchio() -> None:
     _, check = check_fk(robot, problem_for(HRM8), rows, centres)
     assert check.verdict is Verdict.REFUTED
     assert (check.moment, check.where) == (CHUNK + 3, "joint centre O7")
-    judged = verify(problem_for(HRM8), rows.part(CHUNK, CHUNK + 9), robot,
+    judged = verify(problem_for(HRM8), rows.part(CHUNK, CHUNK + 9),
                     centres=centres[CHUNK : CHUNK + 9])  # fmt: skip
     row = next(check for check in judged.checks if check.name == fk.PLANNED)
     assert row.verdict is Verdict.REFUTED
@@ -100,7 +100,7 @@ def test_the_worst_centre_is_named_wherever_it_is(
     """Oracle: the errors put into the centres that were planned."""
     rng = np.random.default_rng(9)
     monkeypatch.setattr(fk, "CHUNK", 3)
-    robot, zero = load_robot(HRM8), np.zeros(11)
+    robot, zero = load_arm(HRM8), np.zeros(11)
     angles = rng.uniform(-0.2, 0.2, (2, 11, HRM8.n_links))
     motion = Trajectory(zero.astype(bool), zero, zero, *angles)
     honest = joint_centres(HRM8, zero, *angles)

@@ -39,7 +39,6 @@ from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.inside import mesh_notes
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 RADIUS = 0.002
@@ -90,7 +89,7 @@ def verified(
 ) -> tuple[PlanningProblem, Verification]:
     file = read_problem(problem).under(errors)
     arm = file.manipulator
-    found = verify(file, read_trajectory(rows, arm), load_robot(arm), **more)
+    found = verify(file, read_trajectory(rows, arm), **more)
     return file, found
 
 

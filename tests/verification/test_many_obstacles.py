@@ -24,7 +24,6 @@ from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 REACH = 0.3
@@ -142,9 +141,9 @@ def test_sinks_hear_of_near_obstacles_what_they_hear_of_all() -> None:
 def test_of_very_many_obstacles_coal_measures_the_nearest_link_of_far_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    problem, motion, robot = cloud(2), swaying(), load_robot(ARM)
-    (full,) = coal_check.check_coal(robot, problem, motion)
+    problem, motion = cloud(2), swaying()
+    (full,) = coal_check.check_coal(problem, motion)
     monkeypatch.setattr(coal_arm, "MANY", 100)
-    (fewer,) = coal_check.check_coal(robot, problem, motion)
+    (fewer,) = coal_check.check_coal(problem, motion)
     assert full.verdict is fewer.verdict is Verdict.CERTIFIED
     assert 120 + 21 <= fewer.count < full.count

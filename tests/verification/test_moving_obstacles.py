@@ -14,7 +14,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.coal_arm import SPREAD, CoalArm
 from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 HEAD = """
@@ -47,7 +46,7 @@ def motion_of(joints: FloatArray, times: FloatArray) -> Trajectory:
 
 
 def judged(problem: PlanningProblem, motion: Trajectory) -> Verification:
-    return verify(problem, motion, load_robot(problem.manipulator))
+    return verify(problem, motion)
 
 
 def clearance(found: Verification) -> tuple[Verdict, float, float]:
@@ -383,7 +382,7 @@ def test_a_motion_without_times_is_refused(tmp_path: Path) -> None:
     none = np.zeros(2)
     rows = Trajectory(none > 0, none, none, np.zeros((2, 3)), np.zeros((2, 3)))
     with pytest.raises(InvalidInput, match=r"time_s.*'ball' moves"):
-        verify(problem, rows, load_robot(problem.manipulator))
+        verify(problem, rows)
 
 
 @pytest.mark.parametrize("n", [1, 7, 100])
@@ -395,7 +394,7 @@ def test_coal_measures_what_moves_at_rows_all_over(n: int, tmp_path: Path) -> No
     joints = np.zeros((n, 7))
     joints[:, 0] = np.linspace(0.0, 0.4, n)
     times = np.linspace(1.0, 3.0, n)
-    arm = CoalArm(load_robot(problem.manipulator), problem)
+    arm = CoalArm(problem)
     found = list(arm.spread(motion_of(joints, times)))
     rows = sorted({int(k * (n - 1) / (SPREAD - 1)) for k in range(SPREAD)})
     asked = [(row, link) for row in rows for link in range(3)]

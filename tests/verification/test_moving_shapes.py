@@ -14,7 +14,6 @@ from vdsm_pin.problem.scene import Scene, solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.records import Check, Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 NONE = ErrorBox()
@@ -78,8 +77,7 @@ def judged(
     *,
     joint_error: bool = True,
 ) -> Verification:
-    robot = load_robot(problem.manipulator)
-    return verify(problem.under(errors or NONE), motion, robot, joint_error=joint_error)
+    return verify(problem.under(errors or NONE), motion, joint_error=joint_error)
 
 
 def clearance(found: Verification) -> Check:
@@ -166,10 +164,9 @@ def test_what_slides_past_the_arm_is_the_arm_that_slides(
     motion = f"motion: {{times_s: {more.tolist()}, positions: {fine.tolist()}}}"
     knotted = problem_of(tmp_path, "k", f"  - {{name: a, {SHAPES[shape]}, {motion}}}\n")
     chunks: list[ClearanceChunk] = []
-    robot = load_robot(knotted.manipulator)
     motion_q = motion_of(q, times)
     sinks = [chunks.append]
-    two = verify(knotted, motion_q, robot, sinks=sinks, joint_error=True, reach=np.inf)
+    two = verify(knotted, motion_q, sinks=sinks, joint_error=True, reach=np.inf)
     compare(one, two)
     # Three intervals of the trajectory, however many pieces they are proved in.
     rows = np.concatenate([chunk.lower for chunk in chunks])

@@ -14,7 +14,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem, Posture
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.tip import check_tip
 from vdsm_pin.verification.verify import verify
 
@@ -75,16 +74,16 @@ def test_a_goal_may_be_known_by_its_tip_alone() -> None:
 
 
 def test_a_clear_joint_move_is_certified_and_one_through_a_ball_is_not() -> None:
-    motion, robot = swing(), load_robot(ARM)
+    motion = swing()
     task = asked(start=posture(motion, 0), goal=posture(motion, 8))
-    clear = verify(task, motion, robot)
+    clear = verify(task, motion)
     assert clear.verdict is Verdict.CERTIFIED
     assert not [name for name in names(clear.checks) if "path" in name]
     assert [key for key, _ in clear.summary()] == [
         *("problem", "verdict", "proved clearance", "waypoints")
     ]
     ball = replace(BALL, centre=posture(motion, 4).tip - np.array([0.4, 0.0, 0.0]))
-    through = verify(replace(task, scene=Scene((ball,))), motion, robot)
+    through = verify(replace(task, scene=Scene((ball,))), motion)
     assert through.verdict is Verdict.REFUTED
 
 

@@ -14,7 +14,6 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = (
@@ -75,7 +74,7 @@ def write_pair(folder: Path, seed: int) -> tuple[Path, Path]:
 
 
 def judged(problem: PlanningProblem, motion: Trajectory) -> Verification:
-    return verify(problem, motion, load_robot(problem.manipulator))
+    return verify(problem, motion)
 
 
 def centres(problem: PlanningProblem, motion: Trajectory, t: FloatArray) -> FloatArray:

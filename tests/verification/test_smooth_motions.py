@@ -12,7 +12,6 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import Check, Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.tip import check_tip
 from vdsm_pin.verification.verify import verify
 
@@ -44,7 +43,7 @@ def motion_of(
 
 
 def judged(problem: PlanningProblem, motion: Trajectory) -> Verification:
-    return verify(problem, motion, load_robot(problem.manipulator))
+    return verify(problem, motion)
 
 
 def row(found: Verification, name: str) -> Check:

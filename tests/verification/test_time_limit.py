@@ -29,7 +29,6 @@ from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
@@ -53,7 +52,6 @@ def judged(deadline: Deadline) -> Verification:
     return verify(
         problem.under(ErrorBox(joint=1e-4)),
         rows,
-        load_robot(problem.manipulator),
         joint_error=True,
         sinks=[lambda chunk: None],
         deadline=deadline,
@@ -142,7 +140,7 @@ def test_a_certificate_that_is_late_is_no_file(tmp_path: Path) -> None:
     only = Trajectory(
         np.zeros(1, bool), np.zeros(1), rows.x0[:1], rows.alpha[:1], rows.theta[:1]
     )
-    found = verify(problem, only, load_robot(problem.manipulator))
+    found = verify(problem, only)
     good = replace(
         found, checks=tuple(c for c in found.checks if c.verdict is Verdict.CERTIFIED)
     )
@@ -155,9 +153,8 @@ def test_a_certificate_that_is_late_is_no_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("strategy", ["fewest", "clearest", "sturdiest", "paper"])
 def test_planning_that_is_late_says_so_and_nothing_else(strategy: str) -> None:
     problem = read_problem("paper/obs1")
-    robot = load_robot(problem.manipulator)
     with pytest.raises(OutOfTime, match="the time limit of 2 s came first"):
-        plan_and_verify(problem, strategy, robot, deadline=PASSED)
+        plan_and_verify(problem, strategy, deadline=PASSED)
 
 
 def test_proofs_of_the_planner_stop() -> None:

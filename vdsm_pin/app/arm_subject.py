@@ -12,8 +12,8 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.tables import write_cables, write_centres, write_link_angles
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.coal_arm import coal_reach
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import ArmVerification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.verify import verify
 
@@ -36,7 +36,7 @@ class ArmSubject:
     @property
     def urdf_sha256(self) -> str:
         """SHA-256 of the URDF that Pinocchio reads, in hexadecimal."""
-        return load_robot(self.problem.manipulator).urdf_sha256
+        return load_arm(self.problem.manipulator).urdf_sha256
 
     @property
     def n_pairs(self) -> int:
@@ -71,7 +71,6 @@ class ArmSubject:
         return verify(
             self.problem,
             motion,
-            load_robot(self.problem.manipulator),
             sinks=sinks,
             joint_error=joint_error,
             deadline=self.options.deadline,

@@ -46,8 +46,8 @@ from vdsm_pin.report.tables import (
     write_centres,
 )
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 
 TRAJECTORY: Final = "trajectory.csv"
 PLAN: Final = "plan.json"
@@ -145,11 +145,11 @@ def plan_to_folder(
     _check_plannable(problem)
     check_output_folder(folder)
     check_kept([folder / name for name in PLANNED], problem.files)
-    robot = load_robot(problem.manipulator)
+    model = load_arm(problem.manipulator)
     date = now() if report else None
-    record = RunRecord.of(command, problem.source, robot.urdf_sha256, date=date)
+    record = RunRecord.of(command, problem.source, model.urdf_sha256, date=date)
     try:
-        refinement = plan_and_verify(problem, strategy, robot, deadline=deadline)
+        refinement = plan_and_verify(problem, strategy, deadline=deadline)
     except (Infeasible, OutOfTime) as error:
         with staged(folder) as aside:
             write_no_plan(aside / NO_PLAN, problem, error, strategy, record)

@@ -8,7 +8,7 @@ that URDF cannot express; the box of theta and alpha is.
 Plain URDF has no capsule: Pinocchio reads `<capsule>` only in URDF 1.1 and drops it
 silently otherwise, yourdfpy refuses the tag. A round-ended link is therefore written as
 a cylinder and two spheres, whose union is exactly the capsule, and which every reader
-takes. `robot_model` puts exact Coal capsules of the same size in their place.
+takes. `pinocchio_arm` puts exact Coal capsules of the same size in their place.
 
 Masses and inertias are plausible, not measured: a body of uniform density filling its
 collision shape. Nothing in this package uses them; simulators want them.

@@ -24,7 +24,6 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.drawing import runs, wrapped
 from vdsm_pin.verification.moving import whole_rows
 from vdsm_pin.verification.records import ArmVerification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.tip import second_derivatives
 from vdsm_pin.verification.verify import verify
 
@@ -152,13 +151,13 @@ def repair_arm(
     draws &= not trajectory.is_smooth
     ends = [0] if draws else [0, trajectory.n_samples - 1]
     origins = Origins.of(trajectory.joints, ends, pinned)
-    robot, radius = load_robot(problem.manipulator), problem.manipulator.least_radius
+    radius = problem.manipulator.least_radius
     return repaired(
         _Motion(
             *(Slopes(problem), trajectory, origins, trajectory),
             np.arange(float(trajectory.n_samples)),
         ),
-        lambda motion: verify(problem, motion.rows, robot, deadline=deadline),
+        lambda motion: verify(problem, motion.rows, deadline=deadline),
         (FIRST * radius, WIDEST * radius),
         deadline,
         under_errors=problem.errors != ErrorBox(),

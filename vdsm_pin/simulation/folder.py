@@ -25,8 +25,8 @@ from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.inside import arm_inside, check_inside, locate_arm
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import combine
-from vdsm_pin.verification.robot_model import load_robot
 
 EXECUTED: Final = "executed.csv"
 RECORD: Final = "simulation.csv"
@@ -153,7 +153,7 @@ def summary(
     """The simulation in numbers, and what is proved of it."""
     errors, worst = np.abs(found.errors), found.largest_errors.tolist()
     box = ErrorBox(joint=found.largest_error, base=worst[0])
-    robot = load_robot(problem.manipulator)
+    model = load_arm(problem.manipulator)
     return SimulationFile(
         problem=problem.name,
         trajectory_sha256=digest,
@@ -170,7 +170,7 @@ def summary(
         planned=cleared(problem, planned, ErrorBox()),
         executed=cleared(problem, found.trajectory, ErrorBox()),
         within_error_box=cleared(problem, planned, box),
-        versions=versions() | {"mujoco": _mujoco_version(), "urdf": robot.urdf_sha256},
+        versions=versions() | {"mujoco": _mujoco_version(), "urdf": model.urdf_sha256},
     )
 
 

@@ -25,7 +25,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.coal_pairs import CoalPairs, arm_shapes
 from vdsm_pin.verification.coal_shapes import Sides, disagreement
-from vdsm_pin.verification.robot_model import RobotModel
+from vdsm_pin.verification.pinocchio_arm import load_arm
 
 CHUNK_BOUNDS: Final = 1 << 17
 """Coarse bounds held in memory at a time: rows times links times partners."""
@@ -83,7 +83,6 @@ class CoalArm:
     """Links, tool, what they carry, and obstacles as Coal has them.
 
     Args:
-        robot: The arm in Pinocchio and Coal.
         problem: Arm and scene.
         deadline: When to give up making shapes.
         links: Whether links near links are looked for, not near obstacles alone.
@@ -95,15 +94,15 @@ class CoalArm:
 
     def __init__(
         self,
-        robot: RobotModel,
         problem: PlanningProblem,
         deadline: Deadline = NO_LIMIT,
         *,
         links: bool = True,
     ) -> None:
-        self.robot, self.problem, self.pairs = robot, problem, CoalPairs(problem)
-        self._shapes = arm_shapes(robot, problem, deadline)
-        self._radii = robot.manipulator.axis_radii
+        self.problem, self.pairs = problem, CoalPairs(problem)
+        self._model = load_arm(problem.manipulator)
+        self._shapes = arm_shapes(problem, deadline)
+        self._radii = problem.manipulator.axis_radii
         # Partners with coarse bounds: obstacles at rest, then links and tool.
         moves = [isinstance(one, Moving) for one in problem.scene.obstacles]
         still = problem  # with what it keeps packed
@@ -256,17 +255,17 @@ class CoalArm:
 
     def _axes(self, x0: FloatArray, alpha: FloatArray, theta: FloatArray) -> FloatArray:
         """Ends of the links and of the tool at rows, (n, n_axes + 1, 3); [m]."""
-        arm = self.robot.manipulator
+        arm = self.problem.manipulator
         return np.ascontiguousarray(arm.axes(joint_centres(arm, x0, alpha, theta)))
 
     def _poses(
         self, now: tuple[FloatArray, FloatArray, FloatArray], times: FloatArray | None
     ) -> FloatArray:
         """T_base_frame as `arm_shapes` counts, shape (n_rows, n_frames, 3, 4); [m]."""
-        n, moving = self.robot.manipulator.n_links, self.problem.scene.moving
+        n, moving = self.problem.manipulator.n_links, self.problem.scene.moving
         poses = np.zeros((len(now[0]), n + 2 + len(moving), 3, 4))
         poses[..., :3] = np.eye(3)
-        poses[:, 1 : n + 1] = self.robot.poses(*now)[:, :n]
+        poses[:, 1 : n + 1] = self._model.poses(*now)[:, :n]
         poses[:, n + 1, :, 3] = poses[:, 1, :, 3]
         if times is not None:
             for k, one in enumerate(moving, start=n + 2):

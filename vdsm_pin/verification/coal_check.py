@@ -22,7 +22,6 @@ from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances
 from vdsm_pin.verification.coal_rows import CoalRows
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Check, ClosestApproach, Verdict
-from vdsm_pin.verification.robot_model import RobotModel
 
 COAL: Final = "distances by Coal against the proved brackets"
 """Name of the row."""
@@ -116,7 +115,6 @@ class CoalLog:
 
 
 def check_coal(
-    robot: RobotModel,
     problem: PlanningProblem,
     trajectory: Trajectory,
     proved: ProvedLowers | None = None,
@@ -130,7 +128,6 @@ def check_coal(
     motion, and every pair at least once.
 
     Args:
-        robot: The arm in Pinocchio and Coal.
         problem: The arm and the scene.
         trajectory: What is judged.
         proved: Proved lower bounds; Coal must not fall below them at either end of an
@@ -145,7 +142,7 @@ def check_coal(
         OutOfTime: If the time is over.
         VerificationFailed: If Coal refuses a shape.
     """
-    arm, evidence = CoalArm(robot, problem, deadline), CoalEvidence()
+    arm, evidence = CoalArm(problem, deadline), CoalEvidence()
     log = log or CoalLog()
     if not arm.pairs.one.size:
         return ()

@@ -13,7 +13,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances
-from vdsm_pin.verification.robot_model import RobotModel
 
 NEAR: Final = 0.5
 """Pairs are measured up to this part of the body's radius past the required clearance;
@@ -41,7 +40,6 @@ class Missing:
 
 
 def coal_missing(
-    robot: RobotModel,
     problem: PlanningProblem,
     trajectory: Trajectory,
     deadline: Deadline = NO_LIMIT,
@@ -49,7 +47,6 @@ def coal_missing(
     """Links that miss the required clearance at a row, as Coal measures it.
 
     Args:
-        robot: The arm in Pinocchio and Coal.
         problem: The scene and the required clearance.
         trajectory: Every row is looked at.
         deadline: When to give up.
@@ -65,7 +62,7 @@ def coal_missing(
     if not problem.scene.obstacles:
         return ()
     worst: dict[tuple[int, int], Missing] = {}
-    arm = CoalArm(robot, problem, deadline, links=False)
+    arm = CoalArm(problem, deadline, links=False)
     room = NEAR * problem.manipulator.most_radius
     for found in arm.near(trajectory, room, deadline=deadline):
         short = found.distance < problem.required_clearance

@@ -10,9 +10,9 @@ from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.coal_bodies import CoalObstacle, coal_obstacle
 from vdsm_pin.verification.coal_hulls import placed
 from vdsm_pin.verification.coal_shapes import CoalShapes
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Pair
-from vdsm_pin.verification.robot_model import RobotModel
 from vdsm_pin.verification.task import ArmPairs
 
 
@@ -80,9 +80,7 @@ class CoalPairs:
         return np.asarray(np.minimum.reduceat(found, begin))
 
 
-def arm_shapes(
-    robot: RobotModel, problem: PlanningProblem, deadline: Deadline
-) -> CoalShapes:
+def arm_shapes(problem: PlanningProblem, deadline: Deadline) -> CoalShapes:
     """Coal's shapes in the order of `CoalPairs.names`.
 
     The base is frame 0 and link k frame k; then come the feed's, which does not turn,
@@ -93,10 +91,11 @@ def arm_shapes(
         deadline.check()
         return coal_obstacle(solid)
 
-    n, carried = robot.manipulator.n_links, problem.manipulator.carried
+    n, carried = problem.manipulator.n_links, problem.manipulator.carried
+    model = load_arm(problem.manipulator)
     shapes: list[CoalObstacle | None] = [
         (placed(rod, local[:3, 3], local[:3, :3]),)
-        for rod, local in zip(robot.capsules, robot.T_link_capsule, strict=True)
+        for rod, local in zip(model.capsules, model.T_link_capsule, strict=True)
     ]
     frames = [min(k + 1, n) for k in range(len(shapes))]  # the tool is on the last link
     frames += [link or n + 1 for link, _ in carried]

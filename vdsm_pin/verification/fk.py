@@ -11,8 +11,8 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 from vdsm_pin.verification.records import Check, Verdict
-from vdsm_pin.verification.robot_model import RobotModel
 
 CHUNK: Final = 4096
 """Rows held in memory at a time."""
@@ -26,7 +26,7 @@ PLANNED: Final = "joint centres by Pinocchio against the planned ones"
 
 
 def check_fk(
-    robot: RobotModel,
+    model: PinocchioArm,
     problem: PlanningProblem,
     trajectory: Trajectory,
     centres: FloatArray | None = None,
@@ -35,7 +35,7 @@ def check_fk(
     """Compare every joint centre of every row with the closed form and the plan.
 
     Args:
-        robot: The arm in Pinocchio.
+        model: The arm in Pinocchio.
         problem: Names the arm of the closed form.
         trajectory: What is judged.
         centres: Joint centres of Step 6 that the angles were solved from, shape
@@ -57,7 +57,7 @@ def check_fk(
         part = slice(first, first + CHUNK)
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
         theirs, ours = (
-            robot.joint_centres(*joints),
+            model.joint_centres(*joints),
             [joint_centres(problem.manipulator, *joints)],
         )
         ours += [] if centres is None else [centres[part]]

@@ -55,9 +55,9 @@ from vdsm_pin.verification.inside import (
 )
 from vdsm_pin.verification.limits import check_limits, checks_of_others
 from vdsm_pin.verification.moving import check_timed
+from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.records import ArmVerification, Check, Counterexample
-from vdsm_pin.verification.robot_model import RobotModel
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.task import ArmPairs, all_pairs
 from vdsm_pin.verification.tip import check_tip
@@ -67,7 +67,6 @@ from vdsm_pin.verification.yes_or_no import is_certified
 def verify(
     problem: PlanningProblem,
     trajectory: Trajectory,
-    robot: RobotModel,
     *,
     sinks: Sequence[ClearanceSink] = (),
     joint_error: bool = False,
@@ -81,7 +80,6 @@ def verify(
         problem: What is asked; the clearance proof covers every motion within its
             errors.
         trajectory: What is judged, whoever made it.
-        robot: The arm in Pinocchio and Coal.
         sinks: Receive the clearance brackets in chunks, in order.
         joint_error: Whether to find the largest joint error that is still certified.
         deadline: When to give up what is left.
@@ -98,7 +96,7 @@ def verify(
         InvalidInput: If the trajectory is of another arm.
     """
     _check_input(problem, trajectory)
-    box = problem.errors
+    model, box = load_arm(problem.manipulator), problem.errors
     reach = coal_reach(problem) if reach is None else reach
     located = locate_arm(problem, trajectory, box, deadline)
     enclosed = bodies_inside(problem, trajectory, arm_inside(located))
@@ -121,7 +119,7 @@ def verify(
     checks = [
         *guarded(
             fk.NAME,
-            lambda: fk.check_fk(robot, problem, trajectory, centres, deadline),
+            lambda: fk.check_fk(model, problem, trajectory, centres, deadline),
         ),
         *check_limits(problem, trajectory),
         *checks_of_others(problem.scene),
@@ -134,7 +132,7 @@ def verify(
         *enclosed_checks(
             clearance, enclosed, (one.clearance for one in inside.values())
         ),
-        *judgement.by_coal(robot, proved.lowers, log),
+        *judgement.by_coal(proved.lowers, log),
         *guarded(
             cable_check.NAME,
             lambda: cable_check.check_cables(problem, trajectory, deadline),
@@ -242,11 +240,9 @@ class _Judgement:
         asked = *motion, proved.proof, self.deadline, proved.too_close
         return self.extras.take("first contact", (), arm_contacts, *asked)
 
-    def by_coal(
-        self, robot: RobotModel, lowers: ProvedLowers, log: CoalLog
-    ) -> tuple[Check, ...]:
+    def by_coal(self, lowers: ProvedLowers, log: CoalLog) -> tuple[Check, ...]:
         """The second opinion on distances."""
-        motion = robot, self.problem, self.trajectory, lowers, log, self.deadline
+        motion = self.problem, self.trajectory, lowers, log, self.deadline
         return guarded(COAL, lambda: check_coal(*motion))
 
     def survived(

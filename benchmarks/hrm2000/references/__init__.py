@@ -14,9 +14,9 @@ from typing import Any, Final, TypeAlias, cast
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.robot_model import RobotModel
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 
-Follow: TypeAlias = Callable[[PlanningProblem, RobotModel, LinkClearance], Trajectory]
+Follow: TypeAlias = Callable[[PlanningProblem, PinocchioArm, LinkClearance], Trajectory]
 
 REFERENCES: Final[Mapping[str, str]] = MappingProxyType(
     {

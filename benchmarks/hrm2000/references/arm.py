@@ -18,7 +18,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.coal_bodies import coal_bodies
-from vdsm_pin.verification.robot_model import RobotModel
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 
 BETWEEN = 5e-4
 """Kept beyond the required clearance for what happens between two rows; [m]."""
@@ -61,7 +61,7 @@ class Arm:
     """The arm at joint values q = (x0, alpha_1, theta_1, ...)."""
 
     def __init__(
-        self, problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
+        self, problem: PlanningProblem, robot: PinocchioArm, clearance: LinkClearance
     ) -> None:
         self.problem, self.robot, self.clearance = problem, robot, clearance
         self.data, arm = robot.model.createData(), problem.manipulator

@@ -10,7 +10,7 @@ from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.robot_model import RobotModel
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 
 FAR = 100.0
 """How far the rail goes on behind the start; [m]."""
@@ -88,7 +88,7 @@ def lie_on(arm: Arm, goal: Wanted) -> Trajectory:
 
 
 def follow(
-    problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
+    problem: PlanningProblem, robot: PinocchioArm, clearance: LinkClearance
 ) -> Trajectory:
     """Straight to the path and along it, the arm on the tip's trail.
 

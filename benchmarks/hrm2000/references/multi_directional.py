@@ -14,7 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.robot_model import RobotModel
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 
 STEP = 0.05  # m
 ROWS = 10
@@ -70,7 +70,7 @@ def _turned(old: FloatArray, wish: FloatArray, most: float) -> FloatArray:
 
 
 def follow(
-    problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
+    problem: PlanningProblem, robot: PinocchioArm, clearance: LinkClearance
 ) -> Trajectory:
     """To the path on a branch of the tree, then along it, the arm on the trail.
 

@@ -13,7 +13,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.robot_model import RobotModel
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 
 POSTURES, BATCH, STEPS, WIDTH = 40_000, 256, 6_000, 64
 BEND, SCATTER = np.deg2rad(12.0), np.deg2rad(1.0)
@@ -101,7 +101,7 @@ _LEARNT: dict[tuple[bytes, float], Learnt] = {}
 
 
 def follow(
-    problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
+    problem: PlanningProblem, robot: PinocchioArm, clearance: LinkClearance
 ) -> Trajectory:
     """Trained once for an arm, then asked row after row; the judge has the rest to say.
 

@@ -12,7 +12,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.robot_model import RobotModel
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 
 CLOSE_ENOUGH = 2e-8  # m
 MOST_STEPS = 30
@@ -62,7 +62,7 @@ def bodies(arm: Arm) -> pin.GeometryModel:
 
 
 def follow(
-    problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
+    problem: PlanningProblem, robot: PinocchioArm, clearance: LinkClearance
 ) -> Trajectory:
     """Row after row, each by as many programmes as it takes.
 

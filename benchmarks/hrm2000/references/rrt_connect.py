@@ -14,7 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.robot_model import RobotModel
+from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 
 SEED = 1
 util.RNG.setSeed(SEED)
@@ -78,7 +78,7 @@ def _another(
 
 
 def follow(
-    problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
+    problem: PlanningProblem, robot: PinocchioArm, clearance: LinkClearance
 ) -> Trajectory:
     """Draw, and where that ends connect and go on.
 

@@ -15,7 +15,6 @@ from vdsm_pin.problem.desired_path import Order
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 
@@ -54,7 +53,7 @@ def test_a_free_order_shortens_the_detours_and_still_draws_all(name: str) -> Non
     assert way_off_the_path(free) < 0.7 * way_off_the_path(given)
     assert any("another order" in note for note in free.notes)
     assert not any("another order" in note for note in given.notes)
-    result = verify(task, free.trajectory, load_robot(task.manipulator))
+    result = verify(task, free.trajectory)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
 

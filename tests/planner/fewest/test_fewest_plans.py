@@ -25,7 +25,6 @@ from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
 
@@ -68,7 +67,7 @@ def test_the_papers_square_is_drawn_whole_certified_and_sparse(
 ) -> None:
     task = read_problem(f"paper/{name}")
     plan = planned(task)
-    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    result = verify(task, plan.trajectory)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
     assert mean_changed(plan) <= most_changed
@@ -138,7 +137,7 @@ def test_a_single_point_is_a_path() -> None:
     task = problem(ball, points=np.array([[3.126, 0.5, 0.5]]), closed=False)
     plan = planned(task)
     assert plan.trajectory.on_path.sum() == 2
-    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    result = verify(task, plan.trajectory)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == 1.0
 
@@ -155,7 +154,7 @@ def test_two_runs_give_the_same_plan_to_the_last_bit() -> None:
 def test_random_scenes_are_drawn_whole_and_certified(seed: int, clutter: bool) -> None:
     task = random_problem(seed, clutter=clutter)
     plan = planned(task)
-    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    result = verify(task, plan.trajectory)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
 
@@ -167,7 +166,7 @@ def test_hundreds_of_random_scenes_are_drawn_whole(clutter: bool) -> None:
     for seed in range(200):
         task = random_problem(seed, clutter=clutter)
         plan = planned(task)
-        result = verify(task, plan.trajectory, load_robot(task.manipulator))
+        result = verify(task, plan.trajectory)
         changed.append(mean_changed(plan))
         if result.verdict is not Verdict.CERTIFIED or result.coverage < 1.0 - 1e-9:
             missed.append(seed)
@@ -190,7 +189,7 @@ def test_a_path_into_an_obstacle_is_refused_or_drawn_up_to_it() -> None:
     assert [stretch.partition("(")[2] for stretch in plan.undrawn] == [
         "proved: within the margin of 'ball')"
     ]
-    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    result = verify(task, plan.trajectory)
     assert result.verdict is Verdict.INCOMPLETE
     # The chord of the sphere grown by body and clearance, to one row on either side.
     lost = 2.0 * (0.1 + 0.0615 + 0.0035)
@@ -222,7 +221,7 @@ def test_an_arm_that_starts_bent_starts_there() -> None:
     task = problem(start=start, start_joints=joints)
     plan = planned(task)
     np.testing.assert_allclose(plan.trajectory.joints[0], joints, atol=1e-9)
-    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    result = verify(task, plan.trajectory)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
 
@@ -237,7 +236,7 @@ def test_clearest_keeps_much_more_clearance_and_survives_larger_joint_errors(
     lean = plan_fewest(task, clearance, 0.0)
     assert clearance(wide.centres).min() > clearance(lean.centres).min() + gain
     assert changed_along(wide) >= changed_along(lean)
-    result = verify(task, wide.trajectory, load_robot(task.manipulator))
+    result = verify(task, wide.trajectory)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
     error = float(np.deg2rad(0.12))

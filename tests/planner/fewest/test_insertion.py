@@ -44,7 +44,6 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")
@@ -210,7 +209,7 @@ def test_a_thin_tool_goes_where_its_link_does_not() -> None:
     task = replace(
         task, manipulator=arm, tip_path=replace(task.path, start=np.array(START))
     )
-    found = plan_and_verify(task, "fewest", load_robot(arm))
+    found = plan_and_verify(task, "fewest")
     assert found.verification.verdict is Verdict.CERTIFIED
     assert found.verification.coverage == pytest.approx(1.0)
 
@@ -616,7 +615,7 @@ def test_a_box_that_opens_away_from_the_base_is_entered_backwards() -> None:
 def plan_and_judge(task: PlanningProblem) -> Plan:
     """A plan that draws everything, certified."""
     plan = plan_fewest(task, link_clearance(task), 0.0)
-    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    result = verify(task, plan.trajectory)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
     return plan
@@ -648,5 +647,5 @@ def test_thin_links_pass_where_thick_ones_do_not() -> None:
     task = replace(task, manipulator=arm)
     plan = plan_fewest(task, link_clearance(task), 0.0)
     assert plan.undrawn == ()
-    found = verify(task, plan.trajectory, load_robot(arm))
+    found = verify(task, plan.trajectory)
     assert found.verdict is Verdict.CERTIFIED

@@ -26,7 +26,6 @@ from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.pointing import NAME
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 WELD = np.array([[2.8, 0.2, 0.1], [2.8, 0.5, 0.1], [2.8, 0.5, 0.4]])
@@ -44,7 +43,7 @@ def looking(pointing: Pointing, *obstacles: Obstacle) -> PlanningProblem:
 
 
 def planned(task: PlanningProblem) -> Refinement:
-    return plan_and_verify(task, "fewest", load_robot(task.manipulator))
+    return plan_and_verify(task, "fewest")
 
 
 def largest_angle(task: PlanningProblem, found: Refinement) -> float:

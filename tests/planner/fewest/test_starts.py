@@ -28,7 +28,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 LENGTH = 3.126
@@ -57,7 +56,7 @@ def judged(task: PlanningProblem) -> Verification:
     plan = plan_fewest(task, link_clearance(task), 0.0)
     start = plan.trajectory.joints[0]
     np.testing.assert_allclose(start, task.path.start_joints, atol=1e-9)
-    return verify(task, plan.trajectory, load_robot(task.manipulator))
+    return verify(task, plan.trajectory)
 
 
 @pytest.mark.parametrize("count", [2, 3, 5, 13, 40])
@@ -147,7 +146,7 @@ def test_a_problem_moved_as_a_whole_has_the_same_plan(tmp_path: Path) -> None:
     # Rounding may put one row more into a turn.
     assert abs(one.n_samples - other.n_samples) <= 3
     np.testing.assert_allclose(one.joints[-1], other.joints[-1], atol=1e-6)
-    result = verify(there, other, load_robot(there.manipulator))
+    result = verify(there, other)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
 
@@ -181,7 +180,7 @@ def test_the_papers_rule_starts_with_a_straight_arm_only() -> None:
     theta[0] = 0.1
     leaning = starting(arm, alpha, theta)
     plan = plan_paper(leaning, link_clearance(leaning), 0.0)
-    verified = verify(leaning, plan.trajectory, load_robot(arm))
+    verified = verify(leaning, plan.trajectory)
     assert verified.verdict is Verdict.CERTIFIED
     theta[2] = 0.1
     bent = starting(arm, alpha, theta)

@@ -29,7 +29,6 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 
@@ -115,8 +114,8 @@ def test_the_same_on_many_scenes(seed: int, clutter: bool) -> None:
 
 
 def hold_to_account(task: PlanningProblem) -> None:
-    robot, clearance = load_robot(task.manipulator), link_clearance(task)
-    plan = plan_and_verify(task, "sturdiest", robot).plan
+    clearance = link_clearance(task)
+    plan = plan_and_verify(task, "sturdiest").plan
     error = survived(task, plan)
     for other in (plan_fewest, plan_clearest):
         assert error >= survived(task, other(task, clearance, 0.0))
@@ -124,17 +123,15 @@ def hold_to_account(task: PlanningProblem) -> None:
     assert told is not None
     assert float(told[1]) == pytest.approx(np.rad2deg(error), abs=6e-4)
     below = ErrorBox(joint=error - TOLERANCES.joint_error)
-    result = verify(task.under(below), plan.trajectory, robot)
+    result = verify(task.under(below), plan.trajectory)
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
-    above = verify(
-        task.under(replace(below, joint=3.0 * error)), plan.trajectory, robot
-    )
+    above = verify(task.under(replace(below, joint=3.0 * error)), plan.trajectory)
     assert above.verdict is not Verdict.CERTIFIED
     lost = re.search(r"start itself does not survive (\S+) deg", plan.notes[-1])
     if lost is not None:
         box = ErrorBox(joint=np.deg2rad(float(lost[1]) + 1e-3))
-        alone = verify(task.under(box), plan.trajectory.part(0, 1), robot)
+        alone = verify(task.under(box), plan.trajectory.part(0, 1))
         assert alone.counterexamples  # a configuration within the box that is too near
 
 
@@ -161,7 +158,7 @@ def test_two_runs_give_the_same_plan_and_the_same_rivals() -> None:
 
 def test_without_obstacles_the_fewest_knees_will_do() -> None:
     task = problem()
-    plan = plan_and_verify(task, "sturdiest", load_robot(ARM)).plan
+    plan = plan_and_verify(task, "sturdiest").plan
     assert plan.strategy == "sturdiest"
     np.testing.assert_allclose(
         plan.centres[:1], straight_arm(task, task.path.start[None]), atol=1e-12

@@ -9,13 +9,12 @@ from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.online import OnlineRule
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.verification.robot_model import load_robot
 
 
 @pytest.mark.parametrize("name", ["free", "obs1", "obs2-small", "obs3"])
 def test_steps_are_the_rows_of_the_plan(name: str) -> None:
     problem = read_problem(f"paper/{name}")
-    plan = plan_and_verify(problem, "paper", load_robot(problem.manipulator)).plan
+    plan = plan_and_verify(problem, "paper").plan
     assert plan.steps is not None
     rule, route = OnlineRule.of(plan), plan.steps.route
     for k in range(0, plan.trajectory.n_samples, 7):
@@ -26,7 +25,7 @@ def test_steps_are_the_rows_of_the_plan(name: str) -> None:
 
 def test_what_the_rule_cannot_do_is_refused() -> None:
     problem = read_problem("paper/free")
-    plan = plan_and_verify(problem, "paper", load_robot(problem.manipulator)).plan
+    plan = plan_and_verify(problem, "paper").plan
     with pytest.raises(Infeasible):
         OnlineRule.of(plan).step(np.array([3.126, 2.5, 0.0]))
     with pytest.raises(ValueError, match="'fewest', expected 'paper'"):

@@ -25,7 +25,6 @@ from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ALL = ["free", "obs1", "obs2", "obs2-small", "obs3"]
@@ -358,5 +357,5 @@ def test_a_single_point_is_drawn_by_resting_there(
     on_path = plan.trajectory.on_path
     assert on_path.sum() == 2
     np.testing.assert_array_equal(np.ptp(plan.trajectory.joints[on_path], axis=0), 0.0)
-    verified = verify(task, plan.trajectory, load_robot(task.manipulator))
+    verified = verify(task, plan.trajectory)
     assert verified.verdict is Verdict.CERTIFIED

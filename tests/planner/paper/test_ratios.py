@@ -21,7 +21,6 @@ from vdsm_pin.problem.scaling import (
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 FREE = read_problem("paper/free")
 ARM = FREE.manipulator
@@ -89,11 +88,11 @@ def test_what_the_file_asks_for_is_planned_and_certified(
     block: str, tmp_path: Path
 ) -> None:
     problem = read_problem(written(tmp_path, block))
-    found = plan_and_verify(problem, "paper", load_robot(problem.manipulator))
+    found = plan_and_verify(problem, "paper")
     assert found.verification.verdict is Verdict.CERTIFIED
     assert np.abs(found.plan.centres - planned(None).centres[:1]).max() > 0.1
     with pytest.raises(NoPlanFound, match="does not read ratios"):
-        plan_and_verify(problem, "fewest", load_robot(problem.manipulator))
+        plan_and_verify(problem, "fewest")
     with pytest.raises(ValueError, match="ratios of its own"):
         OnlineRule.of(found.plan)
 

@@ -17,10 +17,8 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.robot_model import load_robot
 
 FREE = read_problem("paper/free")
-ROBOT = load_robot(FREE.manipulator)
 PAIR = (0.7, 0.6, 0.12), (0.5, 0.8, 0.10)
 TRIO = (0.7, 0.6, 0.10), (0.55, 0.75, 0.08), (0.85, 0.5, 0.06)
 
@@ -39,7 +37,7 @@ def rods(*places: tuple[float, float, float]) -> PlanningProblem:
 def test_two_and_three_prisms_along_the_rail_are_passed(
     places: tuple[tuple[float, float, float], ...],
 ) -> None:
-    found = plan_and_verify(rods(*places), "paper", ROBOT)
+    found = plan_and_verify(rods(*places), "paper")
     assert found.verification.verdict in (Verdict.CERTIFIED, Verdict.INCOMPLETE)
     assert found.verification.min_clearance >= FREE.required_clearance
     assert found.verification.coverage > 0.9
@@ -53,7 +51,7 @@ def test_an_obstacle_out_of_the_way_is_left_alone() -> None:
     far = Sphere("ball", np.array([1.0, -1.5, -1.5]), 0.2)
     near = rods((0.7, 0.6, 0.2)).scene.obstacles[0]
     problem = replace(FREE, scene=Scene((far, near)))
-    found = plan_and_verify(problem, "paper", ROBOT)
+    found = plan_and_verify(problem, "paper")
     assert found.verification.verdict is Verdict.CERTIFIED
     assert found.plan.steps is not None
     assert found.plan.steps.avoidance.passed == "rod 1"
@@ -64,10 +62,10 @@ def test_a_plan_in_part_is_kept_where_both_together_cannot_be_passed() -> None:
     alone = read_problem("paper/obs2")
     opposite = rods((-0.9, -0.9, 0.1)).scene.obstacles
     problem = replace(alone, scene=Scene(alone.scene.obstacles + opposite))
-    found = plan_and_verify(problem, "paper", ROBOT)
+    found = plan_and_verify(problem, "paper")
     assert found.verification.verdict is Verdict.CERTIFIED
     assert found.verification.coverage == pytest.approx(0.983, abs=1e-3)
-    wanted = plan_and_verify(alone, "paper", ROBOT).plan.trajectory
+    wanted = plan_and_verify(alone, "paper").plan.trajectory
     np.testing.assert_array_equal(found.plan.trajectory.joints, wanted.joints)
 
 
@@ -76,13 +74,13 @@ def test_an_obstacle_that_is_hit_on_the_way_round_another_is_no_plan() -> None:
     near = rods((0.7, 0.6, 0.2)).scene.obstacles[0]
     problem = replace(FREE, scene=Scene((near, ball)))
     with pytest.raises(NoPlanFound, match=r"round .rod 1. the links meet an obstacle"):
-        plan_and_verify(problem, "paper", ROBOT)
+        plan_and_verify(problem, "paper")
 
 
 def test_more_obstacles_than_groups_are_made_of_are_refused() -> None:
     places = [(0.7, 0.1 * k, 0.02) for k in range(5)]
     with pytest.raises(NoPlanFound, match=r"there are 5 obstacles.*round up to 4"):
-        plan_and_verify(rods(*places), "paper", ROBOT)
+        plan_and_verify(rods(*places), "paper")
 
 
 def test_the_merged_section_holds_all() -> None:

@@ -15,7 +15,7 @@ from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import rendered
 from vdsm_pin.verification.coal_arm import CoalArm
-from vdsm_pin.verification.robot_model import RobotModel, load_robot
+from vdsm_pin.verification.pinocchio_arm import load_arm
 
 PAGE: Final = "explain.html"
 
@@ -43,8 +43,7 @@ def explain_to_folder(
         name = problem.scene.moving[0].name
         message = f"obstacle {name!r} moves, which the paper's steps know nothing of"
         raise InvalidInput(message)
-    robot = load_robot(problem.manipulator)
-    found = plan_and_verify(problem, "paper", robot)
+    found = plan_and_verify(problem, "paper")
     made = found.plan.steps
     assert made is not None  # the strategy `paper` tells them
     row = _row(made, waypoint)
@@ -57,7 +56,7 @@ def explain_to_folder(
         steps.joints_step(moment),
         steps.lift_step(moment),
         steps.angles_step(moment),
-        _checks(robot, found, row),
+        _checks(found, row),
     )
     with staged(folder) as aside:
         text = rendered(  # pictures are our own SVG
@@ -82,13 +81,14 @@ def _row(made: PaperSteps, waypoint: int | None) -> int:
     return waypoint
 
 
-def _checks(robot: RobotModel, found: Refinement, row: int) -> Part:
+def _checks(found: Refinement, row: int) -> Part:
     """What others say of the same configuration."""
     plan, problem = found.plan, found.plan.problem
     one = plan.trajectory.part(row, row + 1)
-    centres = robot.joint_centres(one.x0, one.alpha, one.theta)[0]
+    model = load_arm(problem.manipulator)
+    centres = model.joint_centres(one.x0, one.alpha, one.theta)[0]
     error = float(np.linalg.norm(centres - plan.centres[row], axis=1).max())
-    arm, rows = CoalArm(robot, problem, links=False), []
+    arm, rows = CoalArm(problem, links=False), []
     for seen in arm.near(one, np.inf):
         rows += [
             (*arm.pairs.named(pair), mm(seen.distance[k]), mm(low), mm(seen.upper[k]))

@@ -14,8 +14,8 @@ from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput, VerificationFailed
+from vdsm_pin.verification.pinocchio_arm import load_arm, read_arm
 from vdsm_pin.verification.pinocchio_frames import PinocchioFrames
-from vdsm_pin.verification.robot_model import load_robot, read_robot
 
 HRM8 = built_in("hrm8")
 AGREEMENT = 1e-12
@@ -79,7 +79,7 @@ def yourdfpy_centres(
 def test_pinocchio_and_the_closed_form_agree_at_10000_configurations() -> None:
     joints = random_joints(np.random.default_rng(11), HRM8, 10_000)
     ours = joint_centres(HRM8, *joints)
-    pinocchio = load_robot(HRM8).joint_centres(*joints)
+    pinocchio = load_arm(HRM8).joint_centres(*joints)
     np.testing.assert_allclose(pinocchio, ours, rtol=0, atol=AGREEMENT)
     third = yourdfpy_centres(HRM8, *(values[:1_000] for values in joints))
     np.testing.assert_allclose(third, ours[:1_000], rtol=0, atol=AGREEMENT)
@@ -91,7 +91,7 @@ def test_they_agree_on_any_arm(n_links: int) -> None:
     arm = random_arm(rng, n_links)
     joints = random_joints(rng, arm, 300)
     ours = joint_centres(arm, *joints)
-    pinocchio = load_robot(arm).joint_centres(*joints)
+    pinocchio = load_arm(arm).joint_centres(*joints)
     np.testing.assert_allclose(pinocchio, ours, rtol=0, atol=AGREEMENT)
     few = tuple(values[:12] for values in joints)
     third = yourdfpy_centres(arm, *few)
@@ -100,7 +100,7 @@ def test_they_agree_on_any_arm(n_links: int) -> None:
 
 def test_link_frames_point_along_the_links() -> None:
     x0, alpha, theta = random_joints(np.random.default_rng(2), HRM8, 50)
-    turns = load_robot(HRM8).poses(x0, alpha, theta)[:, :-1, :, :3]
+    turns = load_arm(HRM8).poses(x0, alpha, theta)[:, :-1, :, :3]
     centres = joint_centres(HRM8, x0, alpha, theta)
     along = np.diff(centres, axis=1) / HRM8.link_lengths[:, None]
     np.testing.assert_allclose(turns[..., 0], along, atol=1e-14)
@@ -112,7 +112,7 @@ def test_link_frames_point_along_the_links() -> None:
 
 
 def test_capsules_lie_between_the_joint_centres() -> None:
-    robot = load_robot(HRM8)
+    robot = load_arm(HRM8)
     for capsule, pose, length in zip(
         robot.capsules, robot.T_link_capsule, HRM8.link_lengths, strict=True
     ):
@@ -123,7 +123,7 @@ def test_capsules_lie_between_the_joint_centres() -> None:
 
 
 def test_answers_of_one_call_survive_the_next() -> None:
-    robot = load_robot(HRM8)
+    robot = load_arm(HRM8)
     rng = np.random.default_rng(4)
     first = robot.poses(*random_joints(rng, HRM8, 9))
     kept = first.copy()
@@ -133,12 +133,12 @@ def test_answers_of_one_call_survive_the_next() -> None:
 
 def test_hash_is_of_the_document() -> None:
     text = urdf_text(HRM8)
-    assert load_robot(HRM8).urdf_sha256 == hashlib.sha256(text.encode()).hexdigest()
+    assert load_arm(HRM8).urdf_sha256 == hashlib.sha256(text.encode()).hexdigest()
 
 
 def test_an_unknown_link_is_no_number() -> None:
     """`x0` is the name of a joint's frame, which is no link's."""
-    model = load_robot(HRM8).model
+    model = load_arm(HRM8).model
     (number,) = PinocchioFrames.of(model, ["link3"]).numbers
     assert model.frames[number].name == "link3"
     for name in ("link9", "x0"):
@@ -148,7 +148,7 @@ def test_an_unknown_link_is_no_number() -> None:
 
 def test_angles_of_another_arm_are_refused() -> None:
     with pytest.raises(InvalidInput, match=r"\(4, 7\).*expected \(4, 8\)"):
-        load_robot(HRM8).joint_centres(np.zeros(4), np.zeros((4, 7)), np.zeros((4, 7)))
+        load_arm(HRM8).joint_centres(np.zeros(4), np.zeros((4, 7)), np.zeros((4, 7)))
 
 
 @pytest.mark.parametrize(
@@ -164,12 +164,12 @@ def test_angles_of_another_arm_are_refused() -> None:
 )
 def test_a_document_of_another_arm_is_refused(text: str, message: str) -> None:
     with pytest.raises(VerificationFailed, match=message):
-        read_robot(HRM8, text)
+        read_arm(HRM8, text)
 
 
 def test_a_base_that_stands_still_is_a_rail_of_no_length() -> None:
     fixed = replace(HRM8, base_range=(0.25, 0.25))
-    robot = read_robot(fixed, urdf_text(fixed))
+    robot = read_arm(fixed, urdf_text(fixed))
     assert robot.model.lowerPositionLimit[0] == robot.model.upperPositionLimit[0]
     assert robot.model.lowerPositionLimit[0] == 0.25
 
@@ -177,7 +177,7 @@ def test_a_base_that_stands_still_is_a_rail_of_no_length() -> None:
 def test_a_broken_document_is_refused_before_pinocchio_sees_it() -> None:
     text = urdf_text(HRM8).replace('<parent link="base" />', '<parent link="b" />')
     with pytest.raises(InvalidInput, match="parent link 'b' does not exist"):
-        read_robot(HRM8, text)
+        read_arm(HRM8, text)
 
 
 def test_an_arm_loaded_again_is_the_same_and_another_one_is_not_taken_for_it() -> None:
@@ -185,7 +185,7 @@ def test_an_arm_loaded_again_is_the_same_and_another_one_is_not_taken_for_it() -
     twin = replace(HRM8)
     zero = np.zeros(1), np.zeros((1, 8)), np.zeros((1, 8))
     for arm in (HRM8, HRM8, twin, longer, HRM8, longer):
-        robot = load_robot(arm)
+        robot = load_arm(arm)
         assert robot.manipulator is arm
         reach = robot.joint_centres(*zero)[0, -1, 0]
         assert reach == pytest.approx(arm.total_length)

@@ -17,13 +17,13 @@ LYING: Final = frozen([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """R_link_capsule: a capsule of Coal stands along z, a link lies along x."""
 
 
-_last: list["RobotModel | None"] = [None]
+_last: list["PinocchioArm | None"] = [None]
 """The last arm that was loaded: most problems of a batch have one arm. Nobody changes
 its model."""
 
 
 @dataclass(frozen=True, eq=False)
-class RobotModel:
+class PinocchioArm:
     """One arm, parsed from its URDF.
 
     Args:
@@ -82,7 +82,7 @@ class RobotModel:
         return q
 
 
-def load_robot(manipulator: Manipulator) -> RobotModel:
+def load_arm(manipulator: Manipulator) -> PinocchioArm:
     """Write the arm's URDF and have Pinocchio read it.
 
     Args:
@@ -95,17 +95,17 @@ def load_robot(manipulator: Manipulator) -> RobotModel:
         VerificationFailed: If Pinocchio does not find the arm's joints in the URDF.
     """
     # Read once and written once: other threads may load other arms meanwhile.
-    robot = _last[0]
-    if robot is None or robot.manipulator is not manipulator:
+    model = _last[0]
+    if model is None or model.manipulator is not manipulator:
         bare = replace(manipulator, feed=None, bodies=(), ignore_pairs=())
         text = urdf_text(bare)  # Coal has the shapes of what is carried as they are
-        if robot is None or robot.urdf_sha256 != sha256_of([text.encode()]):
-            robot = read_robot(manipulator, text)
-        _last[0] = robot = replace(robot, manipulator=manipulator)
-    return robot
+        if model is None or model.urdf_sha256 != sha256_of([text.encode()]):
+            model = read_arm(manipulator, text)
+        _last[0] = model = replace(model, manipulator=manipulator)
+    return model
 
 
-def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
+def read_arm(manipulator: Manipulator, text: str) -> PinocchioArm:
     """The model of an arm from URDF text.
 
     Lengths, axes and shapes in it are not looked at: `fk` holds the joint centres of
@@ -133,7 +133,7 @@ def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
     T_link_capsule = np.tile(np.eye(4), (radii.size, 1, 1))
     T_link_capsule[:, :3, :3] = LYING
     T_link_capsule[:, 0, 3] = (starts + ends) / 2.0
-    return RobotModel(
+    return PinocchioArm(
         manipulator=manipulator,
         urdf_sha256=sha256_of([text.encode()]),
         frames=PinocchioFrames.of(model, [*(f"link{i}" for i in links), "tip"]),
