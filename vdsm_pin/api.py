@@ -282,9 +282,9 @@ def write_certificate(
         >>> result = verify(problem, made.trajectory)
         >>> write_certificate(result, "out/api/free.certificate", "out/api/free.csv")
     """
+    from vdsm_pin.certificate_writer.lines import Hashes
     from vdsm_pin.io.source import check_unchanged, readable, sha256_of_file
     from vdsm_pin.report.folder import check_kept
-    from vdsm_pin.verification.certificate_lines import Hashes
 
     joined: Interpolation = "auto"
     if isinstance(result, ArmVerification):

@@ -12,13 +12,13 @@ from oracles.certificate_oracle import sealed, sha256
 from some_slow import few_of
 
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.certificate_lines import Hashes
-from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.verify import verify
 
 Rng = np.random.Generator

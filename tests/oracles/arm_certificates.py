@@ -16,10 +16,10 @@ from oracles.certificate_oracle import sealed
 from vdsm_pin.app.motions import MotionOptions
 from vdsm_pin.app.subjects import read_problem_or_cell, subject_of
 from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.records import Verdict
 
 ARM: dict[str, Any] = {

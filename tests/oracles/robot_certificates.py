@@ -16,12 +16,12 @@ from oracles.certificate_cases import (
 from oracles.certificate_oracle import sealed
 
 from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
+from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.robots.cell import read_cell
-from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.robots.trajectory_files import read_path
-from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="all">

@@ -17,6 +17,7 @@ from vdsm_pin import api
 from vdsm_pin.app.motions import MotionOptions
 from vdsm_pin.app.subjects import Subject, read_problem_or_cell, subject_of
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import ends_of
@@ -27,7 +28,6 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.inputs import file_notes
 from vdsm_pin.report.page_data import report_data
 from vdsm_pin.robots.by_itself import POSES
-from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import Verdict, Verification
 

@@ -12,6 +12,8 @@ from tests.oracles.certificate_cases import certificate_lines
 from tests.oracles.certificate_oracle import sealed
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
+from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of_file
@@ -19,11 +21,9 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.reason import reason
 from vdsm_pin.robots.cell import Cell, read_cell
-from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.trajectory_files import read_path
-from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.inside import LINKS_OUTSIDE
 from vdsm_pin.verification.records import Verdict

@@ -8,6 +8,8 @@ import pytest
 
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
+from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of_file
@@ -17,10 +19,8 @@ from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell, read_cell
-from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.trajectory_files import read_path
-from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.moving import PART, Knots, in_short_parts
 from vdsm_pin.verification.records import Verdict

@@ -9,6 +9,8 @@ from oracles.random_robots import MESH, random_urdf
 
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
+from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io import bags
@@ -21,14 +23,12 @@ from vdsm_pin.report.robot_facts import robot_facts
 from vdsm_pin.report.scene_rows import scene_words
 from vdsm_pin.robots.by_itself import POSES
 from vdsm_pin.robots.cell import Cell, read_cell
-from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.files import HULLS, MeshCover, RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.records import Verdict
 

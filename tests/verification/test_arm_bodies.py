@@ -28,6 +28,8 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.arm.mounted import LinkBody, Tool
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.certificate_checker.solids import solid as checker_solid
+from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
@@ -39,8 +41,6 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.certificate_lines import Hashes
-from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.records import Pair, Verdict

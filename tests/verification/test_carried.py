@@ -14,6 +14,8 @@ from oracles.certificate_oracle import sealed, sha256
 from vdsm_pin.api import write_report
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem
@@ -22,8 +24,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.reason import reason
 from vdsm_pin.verification.approaches import _station
-from vdsm_pin.verification.certificate_lines import Hashes
-from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.records import (
     ClosestApproach,
     Pair,

@@ -12,14 +12,14 @@ from oracles.certificate_mutations import forged
 from oracles.certificate_oracle import sha256
 
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_writer import lines as lines_module
+from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
+from vdsm_pin.certificate_writer.schema import certificate_schema
 from vdsm_pin.errors import CertificateTooLarge, InvalidFile
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.verification import certificate_lines as lines_module
-from vdsm_pin.verification.certificate_file import certificate_schema
-from vdsm_pin.verification.certificate_lines import Hashes
-from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 

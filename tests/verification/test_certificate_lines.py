@@ -10,9 +10,10 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from vdsm_pin.certificate_checker.program import VERSION
-from vdsm_pin.geometry.convex import Hull
-from vdsm_pin.geometry.solids import BOX_CORNERS, Prism
-from vdsm_pin.verification.certificate_file import (
+from vdsm_pin.certificate_writer.arm import _triangles
+from vdsm_pin.certificate_writer.lines import PER_METRE, _counted
+from vdsm_pin.certificate_writer.links import link_pieces
+from vdsm_pin.certificate_writer.schema import (
     ErrorLimits,
     HeaderLine,
     IntervalLine,
@@ -20,9 +21,8 @@ from vdsm_pin.verification.certificate_file import (
     LinkPieces,
     Primitive,
 )
-from vdsm_pin.verification.certificate_lines import PER_METRE, _counted
-from vdsm_pin.verification.certificate_links import link_pieces
-from vdsm_pin.verification.certificate_writer import _triangles
+from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.geometry.solids import BOX_CORNERS, Prism
 
 
 def test_claims_leave_the_checker_room_where_they_may() -> None:

@@ -22,6 +22,8 @@ from oracles.closed_solids import (
 
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate, main
+from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
@@ -34,8 +36,6 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.inputs import input_notes
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.certificate_lines import Hashes
-from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.inside import mesh_notes
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.io.problem_file import read_problem
@@ -25,8 +27,6 @@ from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.certificate_lines import Hashes
-from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.robust import largest_joint_error

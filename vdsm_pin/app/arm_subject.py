@@ -18,8 +18,8 @@ from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.verify import verify
 
 if TYPE_CHECKING:  # few need repair or a certificate
+    from vdsm_pin.certificate_writer.lines import Hashes
     from vdsm_pin.repair.rounds import Repaired
-    from vdsm_pin.verification.certificate_lines import Hashes
 
 LINK_ANGLES: Final = "link_angles.csv"
 CABLES: Final = "cables.csv"
@@ -86,7 +86,7 @@ class ArmSubject:
     ) -> None:
         """Write the certificate of a verification."""
         # Imported by those who ask for one: its schema takes a while to build.
-        from vdsm_pin.verification.certificate_writer import write_certificate
+        from vdsm_pin.certificate_writer.arm import write_certificate
 
         write_certificate(path, verification, hashes, self.options.deadline)
 

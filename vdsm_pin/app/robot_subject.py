@@ -17,8 +17,8 @@ from vdsm_pin.robots.trajectory_files import moved, path_of, read_motion
 from vdsm_pin.verification.brackets import ClearanceSink
 
 if TYPE_CHECKING:  # few need repair or a certificate
+    from vdsm_pin.certificate_writer.lines import Hashes
     from vdsm_pin.repair.rounds import Repaired
-    from vdsm_pin.verification.certificate_lines import Hashes
 
 GIVEN: Final = Path("trajectory")
 """What messages name in place of a file where a motion has none."""
@@ -79,7 +79,7 @@ class RobotSubject:
         self, path: Path, verification: RobotVerification, hashes: "Hashes"
     ) -> None:
         """Write the certificate of a verification."""
-        from vdsm_pin.robots.certificate import write_robot_certificate
+        from vdsm_pin.certificate_writer.robot import write_robot_certificate
 
         more = self.options.topic, self.options.deadline
         write_robot_certificate(path, verification, hashes, *more)

@@ -18,9 +18,9 @@ from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.records import Verification
 
 if TYPE_CHECKING:  # whoever verifies an arm needs no robots, and few need repair
+    from vdsm_pin.certificate_writer.lines import Hashes
     from vdsm_pin.repair.rounds import Repaired
     from vdsm_pin.robots.cell import Cell
-    from vdsm_pin.verification.certificate_lines import Hashes
 
 ProblemOrCell: TypeAlias = "PlanningProblem | Cell"
 """A problem of a snake arm, or of any other robot in its cell."""

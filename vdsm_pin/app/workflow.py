@@ -293,7 +293,7 @@ def _certify(
         return "not asked for"
     if verification.verdict is not Verdict.CERTIFIED:
         return "no proof"
-    from vdsm_pin.verification.certificate_lines import Hashes
+    from vdsm_pin.certificate_writer.lines import Hashes
 
     hashes = Hashes(record.problem_sha256, record.trajectory_sha256)
     try:

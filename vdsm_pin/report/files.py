@@ -203,7 +203,7 @@ class TimingFile(FileModel):
 
 def _certificate_schema() -> dict[str, Any]:
     # Its models take a while to build, and only this asks for them here.
-    from vdsm_pin.verification.certificate_file import certificate_schema
+    from vdsm_pin.certificate_writer.schema import certificate_schema
 
     return certificate_schema()
 

@@ -13,6 +13,14 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.arm.bodies import triangle_groups
+from vdsm_pin.certificate_writer.lines import (
+    Hashes,
+    Recorded,
+    check_certified,
+    write_lines,
+)
+from vdsm_pin.certificate_writer.links import links_of_others
+from vdsm_pin.certificate_writer.schema import ErrorLimits, HeaderLine, Pair
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import ConvexCover, Mesh, Prism, Solid
@@ -22,14 +30,6 @@ from vdsm_pin.problem.scene import Obstacle, Scene, solid_of, with_hulls
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.certificate_file import ErrorLimits, HeaderLine, Pair
-from vdsm_pin.verification.certificate_lines import (
-    Hashes,
-    Recorded,
-    check_certified,
-    write_lines,
-)
-from vdsm_pin.verification.certificate_links import links_of_others
 from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.moving import whole_path
 from vdsm_pin.verification.records import ArmVerification

@@ -19,6 +19,7 @@ from typing import IO, Any, Final, cast
 import numpy as np
 
 from vdsm_pin import __version__
+from vdsm_pin.certificate_writer.schema import AnyHeader, LastLine
 from vdsm_pin.errors import CertificateTooLarge, VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.atomic import atomic_path
@@ -31,7 +32,6 @@ from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import new_workspace
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.certificate_file import AnyHeader, LastLine
 from vdsm_pin.verification.records import Verdict, Verification
 
 LEVEL: Final = 9

@@ -5,12 +5,12 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
+from vdsm_pin.certificate_writer.schema import LinkPieces, Primitive
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import ConvexCover
 from vdsm_pin.problem.scene import Moving, Obstacle
-from vdsm_pin.verification.certificate_file import LinkPieces, Primitive
 
 EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
 """By the number of a primitive's corners those at the ends of the first one's edges."""

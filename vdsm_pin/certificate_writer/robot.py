@@ -6,6 +6,27 @@ from pathlib import Path
 
 import numpy as np
 
+from vdsm_pin.certificate_writer.arm import (
+    errors_beside,
+    joined_corners,
+    pieces_of_obstacles,
+)
+from vdsm_pin.certificate_writer.lines import (
+    Hashes,
+    Recorded,
+    check_certified,
+    write_lines,
+)
+from vdsm_pin.certificate_writer.links import (
+    Covers,
+    link_pieces,
+    links_of_others,
+)
+from vdsm_pin.certificate_writer.schema import (
+    Pair,
+    RobotErrors,
+    RobotHeaderLine,
+)
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.bodies import Body, PairTable
@@ -16,27 +37,6 @@ from vdsm_pin.robots.files import HULLS
 from vdsm_pin.robots.inside import at_start, question_of_hulls, unlocated_pairs
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.certificate_file import (
-    Pair,
-    RobotErrors,
-    RobotHeaderLine,
-)
-from vdsm_pin.verification.certificate_lines import (
-    Hashes,
-    Recorded,
-    check_certified,
-    write_lines,
-)
-from vdsm_pin.verification.certificate_links import (
-    Covers,
-    link_pieces,
-    links_of_others,
-)
-from vdsm_pin.verification.certificate_writer import (
-    errors_beside,
-    joined_corners,
-    pieces_of_obstacles,
-)
 from vdsm_pin.verification.moving import joined_path
 
 
