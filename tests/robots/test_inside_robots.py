@@ -260,5 +260,5 @@ def test_a_planning_scene_brings_its_meshes(tmp_path: Path) -> None:
     good, first = yaml.read_text(), str(faces[0]["vertex_indices"])
     for bad in ("[0, 1, 99]", "[0, 1, -1]", "[0, 1, 1e30]", "[0, 1, 0.5]", "[0, 1]"):
         text = write(tmp_path, "bad.yaml", good.replace(first, bad, 1))
-        with pytest.raises(InvalidFile, match=r"of 8 vertices|3 num"):
+        with pytest.raises(InvalidFile, match=r"of 8 vertices|3 finite num"):
             read_scene(text, 1.0)

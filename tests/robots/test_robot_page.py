@@ -118,8 +118,8 @@ def test_the_page_names_what_the_file_finds(out: Path) -> None:
     assert series == ["foot", "<arm>", "tool"]
     lower = [unpacked(one["values"]) for one in data["charts"][0]["series"]]
     first, near = data["closest"][0], file["closest"][0]
-    assert (near["body"], near["obstacle"], near["deeper"]) == ("tool", "post", True)
-    link = series.index("tool")
+    assert (near["body"], near["obstacle"], near["deeper"]) == ("<arm>", "post", True)
+    link = series.index("<arm>")
     assert (first["link"], first["moment"]) == (link + 1, near["moment"])
     assert lower[link].min() <= 1e3 * near["upper_m"] < -10.0
     # The frame of the file is not the base frame.
