@@ -292,7 +292,7 @@ class OracleWriter:
             for i, other in self.partners()
         ]
         return {
-            "vdsm_certificate": 8,
+            "vdsm_certificate": 9,
             "problem_sha256": self.problem.sha256,
             "trajectory_sha256": sha256(self.trajectory_path.read_bytes()),
             "versions": {"vdsm_pin": "0", "numpy": np.__version__},

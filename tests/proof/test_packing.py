@@ -220,7 +220,7 @@ def test_of_two_sides_the_one_at_rest_or_of_more_pieces_is_the_partner(
             branches = tree.branches[[one.frame, other.frame]]
             swapped = pair.one == 5 or (pair.other != 5 and (
                 one.frame == WORLD if WORLD in (one.frame, other.frame)
-                else branches[0] != branches[1] or len(other.pieces) < len(one.pieces)
+                else branches[0] != branches[1] or len(other.pieces) <= len(one.pieces)
             ))  # fmt: skip
             mover, partner = (
                 (pair.other, pair.one) if swapped else (pair.one, pair.other)

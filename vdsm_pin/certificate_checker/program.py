@@ -28,7 +28,7 @@ from vdsm_pin.io.source import bounded_lines, check_is_file_or_bag, check_unchan
 from vdsm_pin.robots.files import read_cell_file
 from vdsm_pin.text import printable, show_everything
 
-VERSION: Final = 8
+VERSION: Final = 9
 PRECISION: Final = 128
 """Bits of a ball: lengths are known to about 1e-35 m."""
 

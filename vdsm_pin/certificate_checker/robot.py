@@ -325,7 +325,7 @@ class Robot:
         pairs = [*combinations(links, 2)]
         apart = [names for names in pairs if self._held(*names, left)]
         for one, other in apart:
-            both = (links[one], links[other])
+            both = (links[other], links[one])
             (frame, link), (at, rest) = sorted(both, key=lambda x: len(x[1].parts))
             for each in link.parts:
                 yield Pair(Body(frame, each), rest, at, own, 0.0)

@@ -78,7 +78,7 @@ class LinkPieces(LineModel):
 class AnyHeader(LineModel):
     """Line 1, of whatever moves."""
 
-    vdsm_certificate: Literal[8] = Field(default=8, description="version of the format")
+    vdsm_certificate: Literal[9] = Field(default=9, description="version of the format")
     problem_sha256: Sha256 = Field(description="problem file and all that it names")
     trajectory_sha256: Sha256 = Field(description="the trajectory file")
     versions: dict[str, str] = Field(description="of the writer; told, not proved")

@@ -1,7 +1,8 @@
 """How pairs of bodies are asked: convex parts of one side move past the other.
 
 Of the two sides the one at rest in the world is the partner, else the one of more
-pieces, or of a branch of its own; the other one moves past it, part by part.
+pieces, or of a branch of its own, or the first one, which is mostly nearer to the base;
+the other one moves past it, part by part.
 """
 
 from collections.abc import Sequence
@@ -93,6 +94,6 @@ def _swapped(tree: Tree, bodies: Sequence[Body], pairs: PairTable) -> BoolArray:
     later = np.where(
         rests | (frames[other] == WORLD),
         rests,
-        apart | (n_pieces[other] < n_pieces[one]),
+        apart | (n_pieces[other] <= n_pieces[one]),
     )
     return np.where(bounded[one] & bounded[other], later, ~bounded[one])
