@@ -11,6 +11,7 @@ import pytest
 
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.arm.mounted import Feed
+from vdsm_pin.certificate_writer import lines as certificate_lines
 from vdsm_pin.errors import CertificateTooLarge
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -36,7 +37,6 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import (
-    certificate_lines,
     clearance,
     coal_missing,
     proved_lowers,
@@ -416,7 +416,7 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
     arm = SimpleNamespace(near=near, pairs=pairs, problem=asked)
     monkeypatch.setattr(coal_missing, "CoalArm", lambda *_, **__: arm)
     blank: Any = None
-    found = coal_missing.coal_missing(blank, asked, blank)
+    found = coal_missing.coal_missing(asked, blank)
     assert [(one.link, one.obstacle) for one in found] == sorted(expected)
     for one in found:
         waypoint, gap, normal = expected[one.link, one.obstacle]
