@@ -1,6 +1,8 @@
 """Proofs that no way leads to a tip, from both sides of what passes."""
 
 import itertools
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
-from vdsm_pin.planner.fewest.explore import explore
+from vdsm_pin.planner.fewest.explore import _leads_there, explore
 from vdsm_pin.planner.fewest.levels import Effort, Insert, Search
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.route import path_rows
@@ -104,6 +106,32 @@ def test_no_such_proof_is_tried_where_a_way_of_the_tip_is_known(
         # What is known before any search, after the first, and what is proved.
         assert len(list(itertools.islice(found, 3))) == 3
         assert len(asked) == tries
+
+
+@pytest.mark.parametrize("wall", [0.025, 1.0])
+def test_behind_a_wall_between_two_rows_the_path_does_not_lead(wall: float) -> None:
+    """Rows are 10 mm apart; a wall between two of them blocks none of them."""
+    tips, blank = np.outer(np.arange(5), [0.01, 0.0, 0.0]), np.zeros(5, np.bool_)
+
+    def spare(points: FloatArray, ends: FloatArray) -> FloatArray:
+        return np.where((points[:, 0] < wall) & (ends[:, 0] > wall), -0.001, 0.001)
+
+    asked: list[float] = []
+
+    def leads_to(tip: FloatArray) -> bool:
+        asked.append(tip[0])
+        return bool(tip[0] < wall)
+
+    room = SimpleNamespace(spare=spare)
+    room._replace = lambda required: room
+    judge = SimpleNamespace(problem=SimpleNamespace(required_clearance=0.0))
+    outcome: Any = SimpleNamespace(
+        rows=SimpleNamespace(tips=tips), judge=judge, drawn=blank,
+        proof=SimpleNamespace(closed=blank),
+    )  # fmt: skip
+    space: Any = SimpleNamespace(room=room, leads_to=leads_to)
+    assert _leads_there(space, outcome) == (wall > 0.04)
+    assert asked == ([0.0] if wall > 0.04 else [0.0, 0.03])
 
 
 def test_a_tip_beyond_reach_or_in_an_obstacle_counts_as_cut_off() -> None:

@@ -174,10 +174,12 @@ def explore(
         if proofs and (level is first or isinstance(level, Insert)):
             # Seldom needed, so only now: can it be done at all?
             prove = proofs.pop(0)
-            insert_next = next(
-                one for one in (level, *levels) if isinstance(one, Insert)
-            )
-            if prove is _cut_off and _leads_there(spaces.of(insert_next), best):
+            inserts = [one for one in (level, *levels) if isinstance(one, Insert)]
+            if (
+                prove is _cut_off
+                and inserts
+                and _leads_there(spaces.of(inserts[0]), best)
+            ):
                 continue
             proof = prove(problem, clearance, best)
             best = replace(best, proof=proof)
@@ -220,10 +222,12 @@ class _Spaces:
 
 def _leads_there(space: TipSpace, outcome: Outcome) -> bool:
     """Whether ways of the tip lead to all stretches that are not drawn."""
-    open_ = ~outcome.proof.closed
-    # From one row to the next the path itself leads.
-    first = open_ & ~outcome.drawn & ~np.append(False, open_[:-1])
-    return all(space.leads_to(tip) for tip in outcome.rows.tips[first])
+    open_, tips = ~outcome.proof.closed, outcome.rows.tips
+    # From one row to the next the path itself leads, unless a wall is between them.
+    room = space.room._replace(required=outcome.judge.problem.required_clearance)
+    led = open_[:-1] & (room.spare(tips[:-1], tips[1:]) >= 0.0)
+    first = open_ & ~outcome.drawn & ~np.append(False, led)
+    return all(space.leads_to(tip) for tip in tips[first])
 
 
 def _inserted(
