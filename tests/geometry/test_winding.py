@@ -66,6 +66,24 @@ def test_hits_are_those_of_exact_arithmetic(seed: int) -> None:
     assert (counts > 0).all()
 
 
+def test_signs_that_rounding_may_turn_are_those_of_exact_arithmetic() -> None:
+    """Rays that pass an edge within rounding; of corners whose differences round."""
+    rng, crossed = np.random.default_rng(8), 0
+    for _ in range(300):
+        corners, point = rng.normal(size=(1, 3, 3)), rng.normal(size=3)
+        share = rng.uniform()
+        ray = share * corners[0, 0] + (1.0 - share) * corners[0, 1] - point
+        view = winding._View(corners, point)
+        exact, found = view._exact(0, ray), view.hits(ray)
+        if exact is None:
+            assert found is None
+            continue
+        assert found is not None
+        assert found.sense.tolist() == [exact[0]] * bool(exact[0])
+        crossed += bool(exact[0])
+    assert 100 < crossed < 200
+
+
 def test_rays_are_spread_over_all_directions() -> None:
     rays = winding.RAYS
     assert rays.shape == (winding.N_RAYS, 3)

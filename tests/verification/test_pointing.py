@@ -123,6 +123,9 @@ def test_a_swing_between_two_rows_is_seen() -> None:
     assert (row.verdict, row.count) == (Verdict.CERTIFIED, 2)
     alone = replace(told, on_path=np.array([False, True, False]))
     assert the_row(task, alone).verdict is Verdict.REFUTED
+    last = replace(told, on_path=np.array([False, False, True]))
+    row = the_row(task, last)
+    assert (row.verdict, row.count) == (Verdict.CERTIFIED, 1)
 
 
 def test_a_target_that_the_tip_runs_through_is_never_green() -> None:
