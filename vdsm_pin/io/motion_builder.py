@@ -29,7 +29,8 @@ def rigid_carrier(
 ) -> Carrier:
     """A frame that goes straight in (x, y, z, roll, pitch, yaw) from knot to knot.
 
-    Whole turns that an angle has at the first knot are taken off all of them, exactly.
+    Whole turns that an angle has at the first knot are taken off all of them; only what
+    is left is rounded.
 
     Args:
         model: Its knots.

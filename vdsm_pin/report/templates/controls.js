@@ -75,7 +75,7 @@ class Clearances {
     const short = !(link.value >= this.required);
     if (!Number.isFinite(link.value)) return { text: "clearance not known here", short };
     const known = Math.abs(obstacle.value - link.value) < 1e-3;
-    const meets = link.upper < 2e-6;  // [mm]: where the proof finds contact, and no depth
+    const meets = link.value <= 0 && link.upper < 2e-6;  // [mm]: contact is found, and no depth
     if (link.value < 0 || meets) {
       return { text: `${link.name} ${meets ? "meets" : "may meet"} ${known ? obstacle.name : "an obstacle"}`, short };
     }
