@@ -16,7 +16,10 @@ MM_PER_M: Final = 1e3
 
 def in_mm(length: float) -> str:
     """A length as people read it, in messages and notes; [m] to mm."""
-    return f"{length * MM_PER_M:.3f} mm".replace("-", "−") if isfinite(length) else "-"
+    if not isfinite(length):
+        return "-"
+    rounded = round(length * MM_PER_M, 3) + 0.0  # no -0
+    return f"{rounded:.3f} mm".replace("-", "−")
 
 
 def clearance_words(clearance: float, deeper: bool = False) -> str:

@@ -69,3 +69,4 @@ def test_a_place_is_told_where_the_file_has_it(tmp_path: Path) -> None:
     )
     assert problem.in_file(np.zeros(3)) == "(1000.0, 2000.0, 300.0) mm"
     assert in_mm(0.0125) == "12.500 mm"
+    assert in_mm(-1e-9) == in_mm(-0.0) == "0.000 mm"

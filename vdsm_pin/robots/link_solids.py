@@ -113,8 +113,9 @@ class LinkReader:
         groups = grouped(corners, count)
         covers.append(groups)
         for points in covering_points(corners, groups):
-            points = distinct_rows(points)  # noqa: PLW2901
-            yield covering_hull(distinct_rows(shift + points @ turn.T))
+            # Fewer are placed, and where they are placed some may come to be equal.
+            placed = shift + distinct_rows(points) @ turn.T
+            yield covering_hull(distinct_rows(placed))
 
     def _triangles(self, link: str, shape: ET.Element) -> FloatArray:
         """The corners of a link's mesh, scaled, shape (n, 3, 3); [m]."""
