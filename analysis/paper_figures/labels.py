@@ -92,9 +92,10 @@ def label_dots(
 
 def _gap(obstacles: FloatArray, centre: FloatArray, half: FloatArray) -> float:
     """Distance of a label's box to the nearest thing, negative inside; [pt]."""
-    beyond = np.abs(obstacles - centre) - half
-    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-    return float((outside + np.minimum(beyond.max(axis=1), 0.0)).min())
+    x, y = (np.abs(obstacles[:, k] - centre[k]) - half[k] for k in (0, 1))
+    right, up = np.maximum(x, 0.0), np.maximum(y, 0.0)
+    inside = np.minimum(np.maximum(x, y), 0.0)
+    return float((np.sqrt(right * right + up * up) + inside).min())
 
 
 def _edges(region: shapely.Geometry) -> list[FloatArray]:
