@@ -11,10 +11,10 @@ demo: $(VENV)/.installed
 	$(BIN)/vdsm batch --out out/demo
 
 test: $(VENV)/.installed
-	$(BIN)/pytest -n 2 -m "not slow and not pages"
+	$(BIN)/pytest -n 2 --dist worksteal -m "not slow and not pages"
 
 test-slow: $(VENV)/.installed
-	$(BIN)/pytest -n 2 -m slow
+	$(BIN)/pytest -n 2 --dist worksteal -m slow
 
 lint: $(VENV)/.installed
 	$(BIN)/ruff format --check .
