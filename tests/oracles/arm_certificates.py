@@ -9,13 +9,13 @@ from oracles.certificate_cases import (
     ROUNDED,
     accepted_closely,
     certificate_lines,
+    check_sealed,
     write_cube,
 )
-from oracles.certificate_oracle import sealed
 
 from vdsm_pin.app.motions import MotionOptions
 from vdsm_pin.app.subjects import read_problem_or_cell, subject_of
-from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_checker import Outcome
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import write_trajectory
@@ -152,13 +152,7 @@ class MadeArm:
     def check(self, lines: list[Any]) -> Outcome:
         """Of other lines beside the files as they are, by hashes that fit."""
         self.write()
-        now = self.hashes()
-        lines[0] |= {
-            "problem_sha256": now.problem,
-            "trajectory_sha256": now.trajectory,
-        }
-        (self.folder / "forged").write_bytes(sealed(lines))
-        return check_certificate(self.folder / "forged", *self.files)
+        return check_sealed(lines, self.folder, self.files, self.hashes())
 
 
 def rows(rng: np.random.Generator, n_links: int, smooth: bool) -> Trajectory:

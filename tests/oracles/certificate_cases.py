@@ -11,6 +11,7 @@ import pytest
 from oracles.certificate_oracle import CannotCertify, OracleWriter, sealed
 
 from vdsm_pin.certificate_checker import Outcome, check_certificate, claims
+from vdsm_pin.certificate_writer.lines import Hashes
 
 SHAPES = (
     "cylinder",
@@ -65,6 +66,19 @@ def accepted_closely(*files: Path, most: float = ROUNDED) -> Outcome:
     assert len(spared) == outcome.n_claims
     assert max(spared, default=0.0) <= most
     return outcome
+
+
+def check_sealed(
+    lines: list[Any], folder: Path, files: tuple[Path, Path], hashes: Hashes | None
+) -> Outcome:
+    """What is said of lines beside files, sealed, with these hashes if any."""
+    if hashes is not None:
+        lines[0] |= {
+            "problem_sha256": hashes.problem,
+            "trajectory_sha256": hashes.trajectory,
+        }
+    (folder / "forged").write_bytes(sealed(lines))
+    return check_certificate(folder / "forged", *files)
 
 
 def write_cube(path: Path, half: float, *, skip: int = 0) -> None:

@@ -11,11 +11,11 @@ from oracles.certificate_cases import (
     ROUNDED,
     accepted_closely,
     certificate_lines,
+    check_sealed,
     write_cube,
 )
-from oracles.certificate_oracle import sealed
 
-from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_checker import Outcome
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.io.source import sha256_of_file
@@ -160,14 +160,8 @@ class Made:
     def check(self, lines: list[Any], fits: bool = True) -> Outcome:
         """Of other lines beside the files as they are; hashes fit unless told."""
         self.write()
-        if fits:
-            now = self.hashes()
-            lines[0] |= {
-                "problem_sha256": now.problem,
-                "trajectory_sha256": now.trajectory,
-            }
-        (self.folder / "forged").write_bytes(sealed(lines))
-        return check_certificate(self.folder / "forged", *self.files)
+        hashes = self.hashes() if fits else None
+        return check_sealed(lines, self.folder, self.files, hashes)
 
 
 def unit(joint: str) -> str:
