@@ -3,25 +3,30 @@
     python -m analysis.mutation --sample 1000 --seed 0 --save out/mutants.md
 
 A change that no test can notice, since it changes nothing that is promised, stands in
-`equivalent.txt` with its reason. With `--noticed FILE` a run takes up where another one
-ended: what was noticed stands in the file and is not tried again, so the file must be
-deleted where tests have been taken away.
+`equivalent.txt` with its reason. With `--kept FILE` a run takes up where another one
+ended: what was tried stands in the file, a line each, and is not tried again.
 """
 
 import argparse
+import json
 import multiprocessing
 import random
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Iterator
 from multiprocessing.queues import Queue
 from pathlib import Path
 from typing import Final
 
 from analysis.mutation.changes import Change, changes, uses
-from analysis.mutation.coverage_map import PLAIN, Asked, CoverageMap, coverage_map
+from analysis.mutation.coverage_map import (
+    PLAIN,
+    Asked,
+    CoverageMap,
+    computed,
+    coverage_map,
+)
 from analysis.mutation.groups import GROUPS, ROOT, Group, modules_of
 from analysis.mutation.trial import Task, Trial, copy_checkout, try_changes
 
@@ -45,9 +50,14 @@ def equivalent_changes() -> dict[str, str]:
     return {key: reason for key, _, reason in rows}
 
 
+def reason_of(key: str, known: dict[str, str]) -> str | None:
+    """Why a change is known to change nothing, by itself or as one of several."""
+    return known.get(key) or known.get(key.partition(" (no. ")[0] + " (all)")
+
+
 def is_equivalent(key: str, known: dict[str, str]) -> bool:
-    """Whether a change is known to change nothing, by itself or as one of several."""
-    return key in known or key.partition(" (no. ")[0] + " (all)" in known
+    """Whether a change is known to change nothing."""
+    return reason_of(key, known) is not None
 
 
 def gone(every: list[Change], known: dict[str, str]) -> list[str]:
@@ -159,59 +169,77 @@ def tried_at_once(tasks: list[Task], plain: str | None, jobs: int) -> Iterator[T
             waiting.cancel_join_thread()  # what is left in it is read by nobody
 
 
-def noticed_before(path: Path | None) -> set[str]:
-    """Keys of the changes that an earlier run noticed."""
+def kept_trials(path: Path | None) -> dict[str, tuple[bool, int, float]]:
+    """What came of changes in earlier runs: noticed, tests, seconds, by key."""
     if path is None or not path.exists():
-        return set()
-    return {*path.read_text(encoding="utf-8").splitlines()}
+        return {}
+    rows = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+    return {key: tuple(rest) for key, *rest in rows}
 
 
 def results(
     group: Group, chosen: list[Change], asked: argparse.Namespace, ends: float
 ) -> Iterator[Trial]:
-    """What came of a group's changes until time is up; what is noticed is noted.
+    """What came of a group's changes until time is up; it is kept for the next run.
 
     What is known to change nothing is not tried.
     """
-    before, known = noticed_before(asked.noticed), equivalent_changes()
-    settled = [c for c in chosen if c.key in before or is_equivalent(c.key, known)]
-    yield from (Trial(c, not is_equivalent(c.key, known), 0, 0.0) for c in settled)
-    left = [c for c in chosen if c not in settled]
+    before, known = kept_trials(asked.kept), equivalent_changes()
+    left = []
+    for change in chosen:
+        if change.key in before:
+            yield Trial(change, *before[change.key])
+        elif is_equivalent(change.key, known):
+            yield Trial(change, False, 0, 0.0)
+        else:
+            left.append(change)
     for trial in tried(group, left, asked) if left else ():
         yield trial
-        if trial.noticed and asked.noticed:
-            with asked.noticed.open("a", encoding="utf-8") as file:
-                file.write(trial.change.key + "\n")
+        if asked.kept:
+            row = trial.change.key, trial.noticed, trial.tests, round(trial.seconds, 2)
+            with asked.kept.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
         if time.monotonic() > ends:
             return
 
 
 def page(trials: dict[str, list[Trial]], known: dict[str, str], seed: int) -> str:
-    """The counts as Markdown, and what nobody noticed."""
+    """The counts as Markdown, what nobody noticed, and why the rest changes nothing."""
     lines = [
         "# Small changes of the code, and how many the fast tests notice",
         "",
-        "One change at a time: a comparison, a sign, an operator, a constant. "
-        f"Made by `make mutants`, seed {seed}.",
+        "One change at a time: a comparison, a sign, an operator, a constant, a",
+        "condition, two arguments in each other's place, a statement left out. Made by",
+        f"`make mutants`, seed {seed}. What is equivalent changes nothing that is",
+        "promised; *after* are those of them that were tried first and judged then.",
         "",
-        "| code | changes | equivalent | noticed | share of the others |",
-        "|---|---|---|---|---|",
+        "| code | changes | equivalent | after | noticed | share of the others | s |",
+        "|---|---|---|---|---|---|---|",
     ]
-    for name, found in trials.items():
-        alike = sum(is_equivalent(t.change.key, known) for t in found)
-        seen = sum(t.noticed for t in found)
-        share = 100.0 * seen / max(1, len(found) - alike)
-        lines.append(f"| {name} | {len(found)} | {alike} | {seen} | {share:.1f} % |")
-    missed = [t for found in trials.values() for t in found
-              if not t.noticed and not is_equivalent(t.change.key, known)]  # fmt: skip
+    lines += [_row(name, found, known) for name, found in trials.items()]
+    every = [trial for found in trials.values() for trial in found]
+    lines += [_row("all", every, known), "", "Seconds are of processor time a change,",
+              "without what finding out takes which test runs which line."]  # fmt: skip
+    unnoticed = sorted((t for t in every if not t.noticed), key=lambda t: t.change.key)
     lines += ["", "## Not noticed", ""]
-    where = Counter(t.change.module for t in missed)
-    lines += [f"* {module}: {count}" for module, count in where.most_common()]
-    lines += ["", *(f"    {t.change.key}  (line {t.change.line}, {t.tests} tests)"
-                    for t in sorted(missed, key=lambda t: t.change.key))]  # fmt: skip
-    lines += ["", "## Equivalent", "", "They stand with their reasons in "
-              "`analysis/mutation/equivalent.txt`."]  # fmt: skip
+    lines += [f"    {t.change.key}  (line {t.change.line}, {t.tests} tests)"
+              for t in unnoticed if not is_equivalent(t.change.key, known)]  # fmt: skip
+    lines += ["", "## Equivalent", "", "Of this sample; all that are known stand in "
+              "`analysis/mutation/equivalent.txt`.", ""]  # fmt: skip
+    lines += [f"* `{t.change.key}`: {reason_of(t.change.key, known)}"
+              for t in unnoticed if is_equivalent(t.change.key, known)]  # fmt: skip
     return "\n".join(lines) + "\n"
+
+
+def _row(name: str, found: list[Trial], known: dict[str, str]) -> str:
+    """A row of the table: counts of some changes."""
+    alike = [t for t in found if not t.noticed and is_equivalent(t.change.key, known)]
+    tried, seen = [t for t in found if t.tests], sum(t.noticed for t in found)
+    share = 100.0 * seen / max(1, len(found) - len(alike))
+    seconds = sum(t.seconds for t in found) / max(1, len(tried))
+    after = sum(t.tests > 0 for t in alike)
+    counts = f"{len(found)} | {len(alike)} | {after} | {seen}"
+    return f"| {name} | {counts} | {share:.1f} % | {seconds:.1f} |"
 
 
 def main() -> None:
@@ -230,7 +258,7 @@ def main() -> None:
     parser.add_argument("--maps", type=Path, default=MAPS, help="what tests cover")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="no more")
     parser.add_argument("--budget", type=float, default=BUDGET, help="[s] a change")
-    parser.add_argument("--noticed", type=Path, help="what earlier runs noticed")
+    parser.add_argument("--kept", type=Path, help="what came of changes so far")
     parser.add_argument("--save", type=Path)
     asked = parser.parse_args()
     groups = [g for g in GROUPS if not asked.group or g.name in asked.group]
@@ -246,6 +274,7 @@ def main() -> None:
             if not trial.noticed and not is_equivalent(trial.change.key, known):
                 line = f"{trial.change.line}, {trial.tests} tests"
                 print(f"not noticed: {trial.change.key} (line {line})", flush=True)
+    print(f"{computed():.0f} s of processor time, with the maps", flush=True)
     text = page(trials, known, asked.seed)
     if asked.save:
         asked.save.parent.mkdir(parents=True, exist_ok=True)

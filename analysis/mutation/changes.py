@@ -1,4 +1,8 @@
-"""One change in a module: of a comparison, a sign, an operator or a constant."""
+"""One change in a module.
+
+Of a comparison, a sign, an operator, a constant or a condition; two arguments in each
+other's place; a statement left out: a raise, an early return, a call, an assignment.
+"""
 
 import ast
 import copy
@@ -33,6 +37,14 @@ OPERATORS: Final[dict[type, tuple[type, ...]]] = {
     ast.BitOr: (ast.BitAnd,),
 }
 NAMES: Final = {"min": "max", "max": "min", "all": "any", "any": "all"}
+EITHER_WAY: Final = frozenset(
+    ("min", "max", "minimum", "maximum", "array_equal", "isinstance", "getattr")
+)
+"""Calls that are the same, or none at all, with arguments in each other's place."""
+
+LEFT_OUT: Final = (ast.Raise, ast.Break, ast.Continue, ast.AugAssign, ast.Delete)
+"""Statements without which a module runs; calls, early returns and what is written to
+places of objects besides."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +105,35 @@ def _swapped(node: ast.AST) -> Iterator[ast.AST]:
             yield ast.copy_location(ast.Constant(value), node)
     elif isinstance(node, ast.Call):
         yield from _other_calls(node)
+    if _is_left_out(node):
+        yield ast.Pass()
+
+
+def _is_left_out(node: ast.AST) -> bool:
+    """Whether a statement is left out by itself; a return only within another one."""
+    if isinstance(node, ast.Assign):
+        return isinstance(node.targets[0], ast.Attribute | ast.Subscript)
+    if isinstance(node, ast.Expr):
+        return isinstance(node.value, ast.Call)
+    return isinstance(node, LEFT_OUT)
+
+
+def _by_place(tree: ast.Module) -> dict[int, ast.AST]:
+    """What changes nodes for where they stand, by id: conditions and early returns."""
+    found: dict[int, ast.AST] = {}
+    for node in ast.walk(tree):
+        tests = node.ifs if isinstance(node, ast.comprehension) else []
+        if isinstance(node, ast.If | ast.While | ast.IfExp):
+            tests = [node.test]
+        for test in tests:
+            if not isinstance(test, ast.Compare | ast.BoolOp | ast.UnaryOp):
+                found[id(test)] = ast.UnaryOp(ast.Not(), copy.deepcopy(test))
+        if isinstance(node, ast.FunctionDef):
+            inner = (n for s in node.body
+                     if not isinstance(s, ast.Return | ast.FunctionDef)
+                     for n in ast.walk(s) if isinstance(n, ast.Return))  # fmt: skip
+            found |= {id(early): ast.Pass() for early in inner}
+    return found
 
 
 def _other_values(value: object) -> tuple[object, ...]:
@@ -115,6 +156,12 @@ def _other_calls(node: ast.Call) -> Iterator[ast.AST]:
         elif isinstance(changed.func, ast.Attribute):
             changed.func.attr = NAMES[name]
         yield changed
+    if len(node.args) > 1 and name not in EITHER_WAY:
+        first, second = node.args[:2]
+        if not isinstance(first, ast.Starred) and not isinstance(second, ast.Starred):
+            changed = copy.deepcopy(node)
+            changed.args[:2] = changed.args[1::-1]
+            yield changed
 
 
 class _Places(ast.NodeVisitor):
@@ -123,19 +170,19 @@ class _Places(ast.NodeVisitor):
     def __init__(self) -> None:
         self.found: list[tuple[ast.AST, str]] = []
         self._within: list[str] = []
-        self._open: set[ast.AST] = set()
+        self._left: set[ast.AST] = set()
 
     def visit(self, node: ast.AST) -> None:
         """Note a node and go on below it, where it is no annotation and no text."""
         if isinstance(node, ast.JoinedStr | ast.Import | ast.ImportFrom):
             return
-        if isinstance(node, ast.keyword) and node.arg == "strict":
-            return  # of zip: what is alike is known to be
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "zip":
+            self._left |= {*node.keywords}  # strict: what is alike is known to be
         if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "reshape":
             # The size left open is -1 or any other below 0.
-            self._open |= {arg.operand for arg in node.args
+            self._left |= {arg.operand for arg in node.args
                            if isinstance(arg, ast.UnaryOp)}  # fmt: skip
-        if node in self._open:
+        if node in self._left:
             return
         self.found.append((node, ".".join(self._within)))
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -169,14 +216,15 @@ def changes(root: Path, module: str) -> list[Change]:
     """
     source = (root / module).read_text(encoding="utf-8")
     tree = ast.parse(source)
-    effects, names = _effects(tree), _names(tree)
+    effects, names, by_place = _effects(tree), _names(tree), _by_place(tree)
     places = _Places()
     places.visit(tree)
     found = []
     for node, function in places.found:
         if not hasattr(node, "lineno"):
             continue
-        for changed in _swapped(node):
+        more = [by_place[id(node)]] if id(node) in by_place else []
+        for changed in [*_swapped(node), *more]:
             found.append(
                 Change(
                     module=module,
@@ -264,7 +312,7 @@ def _effects(tree: ast.Module) -> dict[int, tuple[int, ...]]:
 
 def _with(source: str, node: ast.AST, changed: ast.AST) -> str:
     """The source with a node's text replaced; every other line keeps its number."""
-    assert isinstance(node, ast.expr | ast.AugAssign)
+    assert isinstance(node, ast.expr | ast.stmt)
     assert node.end_lineno is not None
     assert node.end_col_offset is not None
     lines = source.encode().split(b"\n")

@@ -2,16 +2,14 @@
 
 Where a change lies within functions, the child replaces their code, and nothing is
 imported again. What runs at import (constants, defaults, class bodies) is written to a
-copy of the checkout, and its tests run in a process of their own.
+copy of the checkout, and the child imports what stands there, tests as well, again.
 """
 
 import ast
 import gc
 import importlib
-import math
 import os
 import queue
-import resource
 import shutil
 import signal
 import sys
@@ -26,6 +24,7 @@ from typing import Any, Final
 import pytest
 
 from analysis.mutation.changes import Change
+from analysis.mutation.coverage_map import computed
 
 COPIED: Final = ("vdsm_pin", "tests", "urdf", "docs", "analysis", "pyproject.toml")
 PATIENCE: Final = 3.0
@@ -76,7 +75,7 @@ class Trial:
         change: The change.
         noticed: Whether a test failed, crashed or did not end.
         tests: Number of tests asked.
-        seconds: How long it took.
+        seconds: What was computed for it.
     """
 
     change: Change
@@ -168,7 +167,7 @@ class Bench:
         self._failed |= report.failed
 
     def _try(self, task: Task, items: dict[str, pytest.Item]) -> Trial:
-        change, begun = task.change, time.monotonic()
+        change, begun = task.change, computed()
         if not task.tests:
             return Trial(change, False, 0, 0.0)
         if not change.line:
@@ -179,8 +178,7 @@ class Bench:
             status = self._written(module, task)
         else:
             status = self._replaced(module, code, task, items)
-        seconds = time.monotonic() - begun
-        return Trial(change, status != 0, len(task.tests), seconds)
+        return Trial(change, status != 0, len(task.tests), computed() - begun)
 
     def _fail(self, task: Task, items: dict[str, pytest.Item]) -> bool:
         """Whether tests fail here and now, where nothing is changed.
@@ -240,16 +238,18 @@ class Bench:
         return self._functions[module]
 
     def _written(self, module: Path, task: Task) -> int:
-        """Exit status of the tests in a process that imports the changed module."""
+        """Exit status of the tests in a child that imports the checkout again."""
         kept = module.read_bytes()
         module.write_text(task.change.content, encoding="utf-8")
         names = task.asked()
-        words = [sys.executable, "-m", "pytest", "-x", *WORDS, *names]
-        limit = math.ceil(PATIENCE * (2.0 + sum(task.tests[name] for name in names)))
+        limit = PATIENCE * (2.0 + sum(task.tests[name] for name in names))
 
         def child() -> int:
-            resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-            os.execv(words[0], words)
+            for name, one in [*sys.modules.items()]:
+                if str(getattr(one, "__file__", "")).startswith(f"{self._folder}/"):
+                    del sys.modules[name]
+            signal.setitimer(signal.ITIMER_PROF, limit)  # ends the process
+            return pytest.main(["-x", "-s", *WORDS, *names])
 
         try:
             return _status(_forked(child))
@@ -272,13 +272,13 @@ def _forked(work: Callable[[], int]) -> int:
 
 def _status(child: int) -> int:
     """Exit status of a child; above 0 where its tests fail or do not end."""
-    computed, ends, pause = "", time.monotonic() + SILENCE, 0.001
+    before, ends, pause = "", time.monotonic() + SILENCE, 0.001
     while time.monotonic() < ends:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
             return abs(os.waitstatus_to_exitcode(status))
-        if computed != (now := _computed(child)):
-            computed, ends = now, time.monotonic() + SILENCE
+        if before != (now := _computed(child)):
+            before, ends = now, time.monotonic() + SILENCE
         time.sleep(pause)
         pause = min(0.02, 1.5 * pause)
     os.killpg(child, signal.SIGKILL)

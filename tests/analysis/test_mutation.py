@@ -54,6 +54,47 @@ def test_every_change_is_one_valid_module_that_differs(tmp_path: Path) -> None:
         assert ast.parse(one.content)
 
 
+STATEMENTS = """
+def one(known, name, *more):
+    if known:
+        return 1
+    for row in more:
+        if not row:
+            continue
+        known.rows[row] = name
+        known.put(name, row, strict=True)
+        zip(known, row, strict=True)
+    while known.open:
+        raise ValueError(name)
+    return max(name, [n for n in more if n.new] or isinstance(name, row))
+"""
+
+
+def test_statements_conditions_and_arguments_are_changed(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text(STATEMENTS)
+    found = [f"{c.before} -> {c.after}" for c in changes(tmp_path, "module.py")]
+    assert sorted(found) == sorted([
+        "known -> not known",
+        "known.open -> not known.open",
+        "n.new -> not n.new",
+        "not row -> row",
+        "1 -> 2",
+        "return 1 -> pass",
+        "continue -> pass",
+        "raise ValueError(name) -> pass",
+        "known.rows[row] = name -> pass",
+        "known.put(name, row, strict=True) -> pass",
+        "known.put(name, row, strict=True) -> known.put(row, name, strict=True)",
+        "True -> False",
+        "zip(known, row, strict=True) -> pass",
+        "zip(known, row, strict=True) -> zip(row, known, strict=True)",
+        "max(name, [n for n in more if n.new] or isinstance(name, row)) -> "
+        "min(name, [n for n in more if n.new] or isinstance(name, row))",
+        "[n for n in more if n.new] or isinstance(name, row) -> "
+        "[n for n in more if n.new] and isinstance(name, row)",
+    ])  # fmt: skip
+
+
 def test_changes_alike_in_one_function_are_told_apart(tmp_path: Path) -> None:
     module = "def one(x):\n    return x[1] + x[1]\n\n\ndef two(x):\n    return x[1]\n"
     (tmp_path / "module.py").write_text(module)
@@ -77,10 +118,15 @@ def test_text_and_annotations_stay(tmp_path: Path) -> None:
     (tmp_path / "module.py").write_text(MODULE)
     assert not any("+" in one.before for one in changes(tmp_path, "module.py"))
     (tmp_path / "module.py").write_text("y = x.reshape(-1, 3)[-1]\n")
-    found = {(one.before, one.after) for one in changes(tmp_path, "module.py")}
+    found = sorted((one.before, one.after) for one in changes(tmp_path, "module.py"))
     # -2 is the same size left open, but another place.
-    assert found == {("-1", "1"), ("1", "2"), ("3", "4")}
-    assert len(changes(tmp_path, "module.py")) == 4
+    assert found == [
+        ("-1", "1"),
+        ("-1", "1"),
+        ("1", "2"),
+        ("3", "4"),
+        ("x.reshape(-1, 3)", "x.reshape(3, -1)"),
+    ]
 
 
 def test_what_runs_at_import_has_its_effect_where_its_name_is_used(
@@ -170,6 +216,7 @@ def test_a_change_that_matters_is_noticed_and_the_module_is_put_back(
         "x < M -> x >= M True",
         "x < M -> x <= M False",  # nobody asks about 3
         "0 -> 1 True",
+        "return 0 -> pass True",
         "5 -> 6 False",
         "7 -> 8 True",  # called at import
     }
