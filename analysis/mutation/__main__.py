@@ -61,11 +61,12 @@ def is_equivalent(key: str, known: dict[str, str]) -> bool:
 
 
 def gone(every: list[Change], known: dict[str, str]) -> list[str]:
-    """Keys that name no change of these modules any more."""
+    """Keys that name no change of these modules, or a module that is not there."""
     keys = {one.key for one in every}
     keys |= {key.partition(" (no. ")[0] + " (all)" for key in keys}
     modules = {one.module for one in every}
-    return [k for k in known if k.partition(":")[0] in modules and k not in keys]
+    there = {k: k.partition(":")[0] for k in known if k not in keys}
+    return [k for k, m in there.items() if m in modules or not (ROOT / m).exists()]
 
 
 def sampled(groups: list[Group], size: int, seed: int) -> dict[str, list[Change]]:

@@ -19,6 +19,9 @@ import pytest
 SLOW: Final = 6.0
 """Tests that take longer are ended, and not asked; [s]."""
 
+AT_ONCE: Final = 16
+"""Files of tests run in one process: what it saw is kept before the next one begins."""
+
 PLAIN: Final = "NUMBA_DISABLE_JIT"
 """Where it is 1, functions for machine code run as they stand, in Python."""
 
@@ -65,6 +68,11 @@ class CoverageMap:
         return {t: self.seconds[t] for t in sorted(rank, key=rank.__getitem__)}
 
 
+PROGRAMS: Final = ("subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn")
+"""Events of a test that starts a program, in which changed functions are as they were:
+such a test is ended, and not asked."""
+
+
 class TooSlow(BaseException):
     """A test takes too long to be asked; no `except Exception` of a test sees it."""
 
@@ -84,6 +92,12 @@ class Recorder:
     def __init__(self, running: coverage.Coverage) -> None:
         self._running = running
         self.seconds: dict[str, float] = {}
+        self._in_test = False
+        sys.addaudithook(self._heard)
+
+    def _heard(self, event: str, _: object) -> None:
+        if self._in_test and event in PROGRAMS:
+            raise TooSlow
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
@@ -97,12 +111,14 @@ class Recorder:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self) -> Iterator[None]:
-        """End a test that computes for too long."""
+        """End a test that computes for too long or starts a program."""
         signal.signal(signal.SIGPROF, _end_test)
         signal.setitimer(signal.ITIMER_PROF, SLOW)
+        self._in_test = True
         try:
             return (yield)
         finally:
+            self._in_test = False
             signal.setitimer(signal.ITIMER_PROF, 0.0)
 
     def pytest_runtest_logreport(self, report: Any) -> None:
@@ -158,12 +174,28 @@ class Asked:
     plain: bool
 
     def kept(self, folder: Path, file: str) -> Path:
-        """Where the map of one file of tests is kept while nothing changes."""
-        sources = (self.root / name for name in (*self.modules, file))
-        digest = hashlib.sha256(str(self.plain).encode())
-        for source in sources:
-            digest.update(source.read_bytes())
+        """Where the map of one file of tests is kept."""
+        folders = sorted({str(Path(module).parent) for module in self.modules})
+        words = json.dumps([file, self.plain, folders])
+        digest = hashlib.sha256(words.encode() + (self.root / file).read_bytes())
         return folder / f"{digest.hexdigest()[:24]}.json"
+
+    def sources(self, tests: dict[str, Any]) -> dict[str, str]:
+        """Digests of the modules that some tests run: while they stay, the map does."""
+        run = (self.root / name for name, lines in tests.items() if any(lines.values()))
+        return {str(path.relative_to(self.root)): _digest(path) for path in run}
+
+    def holds(self, place: Path) -> bool:
+        """Whether a map is there that still holds."""
+        if not place.exists():
+            return False
+        one = json.loads(place.read_text())
+        return bool(one["sources"] == self.sources(one["tests"]))
+
+
+def _digest(path: Path) -> str:
+    """Of a file's content; "" where it is gone."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else ""
 
 
 def coverage_map(asked: Asked, tests: list[str], jobs: int, kept: Path) -> CoverageMap:
@@ -179,21 +211,26 @@ def coverage_map(asked: Asked, tests: list[str], jobs: int, kept: Path) -> Cover
         RuntimeError: If the tests could not be run.
     """
     places = {file: asked.kept(kept, file) for file in _test_files(asked.root, tests)}
-    missing = [file for file, place in places.items() if not place.exists()]
+    missing = [file for file, place in places.items() if not asked.holds(place)]
     with ThreadPoolExecutor(jobs) as pool:
-        parts = [missing[k::jobs] for k in range(jobs) if missing[k::jobs]]
+        count = max(jobs, -(-len(missing) // AT_ONCE))
+        parts = [missing[k::count] for k in range(count) if missing[k::count]]
         for part, seen in zip(
             parts, pool.map(lambda part: _seen(asked, part), parts), strict=True
         ):
             for file in part:
-                places[file].write_text(json.dumps(_of_file(seen, file)))
+                one = _of_file(seen, file)
+                one["sources"] = asked.sources(one["tests"])
+                places[file].write_text(json.dumps(one))
     whole = CoverageMap({module: {} for module in asked.modules}, {})
     for place in places.values():
         one = json.loads(place.read_text())
         whole.seconds.update(one["seconds"])
         for module, by_line in one["tests"].items():
             for line, names in by_line.items():
-                whole.tests[module].setdefault(int(line), []).extend(names)
+                whole.tests.setdefault(module, {}).setdefault(int(line), []).extend(
+                    names
+                )
     return whole
 
 
