@@ -1,5 +1,7 @@
 """Cable lengths against Eq. 16-19 point by point, and angles back from lengths."""
 
+from dataclasses import replace
+
 import flint
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
 from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.errors import InconsistentCables, InvalidInput
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -69,10 +72,14 @@ def lengths_by_points(
     return lengths
 
 
+@pytest.mark.parametrize("tool", [None, Tool(0.2, 0.01)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_lengths_are_those_of_equations_16_to_21(kind: str) -> None:
+def test_lengths_are_those_of_equations_16_to_21(kind: str, tool: Tool | None) -> None:
+    """Of the links; no cable runs on along a tool behind the last one."""
     alpha, theta = sampled(kind, HRM8, 12)
-    found = cable_lengths(HRM8, alpha, theta)
+    lengths = HRM8.link_lengths + (0.2 if tool else 0.0) * np.eye(8)[7]
+    arm = replace(HRM8, link_lengths=lengths, tool=tool)
+    found = cable_lengths(arm, alpha, theta)
     assert found.shape == (12, 8, 3)
     for k in range(12):
         by_points = lengths_by_points(HRM8, alpha[k], theta[k])

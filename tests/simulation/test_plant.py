@@ -10,6 +10,7 @@ from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.simulation.feed_forward import Statics
 from vdsm_pin.simulation.plant import free_ends, plant_xml, stiffnesses
@@ -41,7 +42,9 @@ def placed(arm: Manipulator, q: FloatArray, settings: Settings | None = None) ->
 
 
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("arm", [HRM8, TWO], ids=["hrm8", "two"])
+@pytest.mark.parametrize(
+    "arm", [HRM8, TWO, replace(TWO, tool=Tool(0.1, 0.01))], ids=["hrm8", "two", "tool"]
+)
 def test_frames_and_cables_are_those_of_the_closed_form(
     arm: Manipulator, seed: int
 ) -> None:

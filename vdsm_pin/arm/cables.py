@@ -169,6 +169,7 @@ def _straight_parts(manipulator: Manipulator) -> FloatArray:
     """What a cable runs inside the links, sum of L_i - 2d, shape (3N,); [m]."""
     joints = np.arange(1, manipulator.n_links + 1)
     inside = manipulator.stations[1:] - 2.0 * manipulator.cables.half_gap * joints
+    inside[-1] -= manipulator.tool_length
     return np.repeat(inside, 3)
 
 

@@ -143,6 +143,11 @@ class Manipulator:
         """Number of links N; joint centres are O_1..O_{N+1}."""
         return int(self.link_lengths.size)
 
+    @property
+    def tool_length(self) -> float:
+        """What the last of the link lengths has beyond the link itself; [m]."""
+        return self.tool.length if self.tool else 0.0
+
     def radius_of(self, link: int) -> float:
         """Radius of a link, counted from 1; [m]."""
         return self.link_radius if self.radii is None else float(self.radii[link - 1])
@@ -230,7 +235,7 @@ class Manipulator:
         """Where axes of links and tool start and end along their links, (n, 2); [m]."""
         spans = [[0.0, length] for length in self.link_lengths.tolist()]
         if self.tool:
-            start = spans[-1][1] - self.tool.length
+            start = spans[-1][1] - self.tool_length
             spans = [*spans[:-1], [0.0, start], [start, spans[-1][1]]]
         return frozen(spans)
 

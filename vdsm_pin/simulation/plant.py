@@ -31,6 +31,7 @@ def stiffnesses(manipulator: Manipulator, settings: Settings) -> FloatArray:
 def free_ends(manipulator: Manipulator) -> FloatArray:
     """What `cable_lengths` counts past the hole where a cable ends, (3N,); [m]."""
     ends = manipulator.link_lengths - 2.0 * manipulator.cables.half_gap
+    ends[-1] -= manipulator.tool_length
     return np.repeat(ends, 3)
 
 
