@@ -240,6 +240,8 @@ def test_a_world_of_hundreds_of_millions_is_refused_at_once(tmp_path: Path) -> N
     [
         (b"w\xff.xml", WORLD.encode(), "has a name that is not UTF-8 text"),
         (b"w.xml", WORLD.encode().replace(b"crate", b"\xff"), "is not XML"),
+        (b"w.xml", b'<?xml version="1.0" encoding="foo"?>' + WORLD.encode(), "foo"),
+        (b"w.xml", b'<?xml version="1.0" encoding="utf-7"?>' + WORLD.encode(), "multi"),
     ],
 )
 def test_names_that_are_no_text_are_refused(

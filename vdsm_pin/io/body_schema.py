@@ -1,6 +1,6 @@
 """The shapes of the problem file as bodies that ride on a link."""
 
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias, Union
 
 from pydantic import Field
 
@@ -21,26 +21,6 @@ class _OnLink(FileModel):
     )
 
 
-class SphereBody(_OnLink, shapes.SphereModel):
-    """A ball on a link."""
-
-
-class CapsuleBody(_OnLink, shapes.CapsuleModel):
-    """A capsule on a link."""
-
-
-class CylinderBody(_OnLink, shapes.CylinderModel):
-    """A cylinder on a link."""
-
-
-class BoxBody(_OnLink, shapes.BoxModel):
-    """A cuboid on a link."""
-
-
-class PrismBody(_OnLink, shapes.PrismModel):
-    """A prism on a link."""
-
-
 class MeshBody(_OnLink, shapes.MeshModel):
     """A mesh on a link: what is proved clear are hulls that hold it and its inside."""
 
@@ -52,7 +32,12 @@ class MeshBody(_OnLink, shapes.MeshModel):
     )
 
 
-BodyModel: TypeAlias = Annotated[
-    CylinderBody | CapsuleBody | SphereBody | BoxBody | PrismBody | MeshBody,
-    Field(discriminator="shape"),
-]
+if TYPE_CHECKING:
+    BodyModel: TypeAlias = MeshBody
+else:
+    _PLAIN = (
+        *(shapes.CylinderModel, shapes.CapsuleModel, shapes.SphereModel),
+        *(shapes.BoxModel, shapes.PrismModel),
+    )
+    _MODELS = *(shapes.with_field(shape, _OnLink, "Body") for shape in _PLAIN), MeshBody
+    BodyModel = Annotated[Union[_MODELS], Field(discriminator="shape")]  # noqa: UP007

@@ -45,6 +45,13 @@ class Frame:
     rotation: FloatArray
     origin: FloatArray
 
+    @property
+    def pose(self) -> FloatArray:
+        """T_world_base: the base in the frame of the file, shape (4, 4); [m]."""
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = self.rotation, self.metres(self.origin)
+        return pose
+
     def metres(self, lengths: object) -> FloatArray:
         """Lengths of the file in metres, any shape."""
         return np.asarray(lengths, dtype=np.float64) / UNITS_PER_METRE[self.unit]

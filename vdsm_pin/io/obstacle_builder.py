@@ -18,8 +18,7 @@ from vdsm_pin.io.clouds import RawCloud, read_cloud
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.mesh_size import MeshSize
-from vdsm_pin.io.motion_builder import FLOATING, rigid_carrier
-from vdsm_pin.io.motion_schema import MotionModel, MovableModel
+from vdsm_pin.io.motion_field import FLOATING, MotionModel, MovableModel
 from vdsm_pin.io.reading import Reading
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location
@@ -114,7 +113,7 @@ class ObstacleBuilder(Reading):
         """An obstacle in its own frame, and what carries it."""
         own = Frame(self.frame.unit, np.eye(3), np.zeros(3))
         solid = replace(self, frame=own).build(model, at)
-        path = rigid_carrier(motion, self.frame, self.document, (*at, "motion"))
+        path = motion.carrier(self.frame, self.document, (*at, "motion"))
         return scene.Moving(solid, path, FLOATING)
 
     @singledispatchmethod

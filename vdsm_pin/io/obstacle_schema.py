@@ -1,8 +1,8 @@
 """The nine shapes of the problem file as pydantic models."""
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, create_model
 
 from vdsm_pin.io.schema_types import (
     FileModel,
@@ -146,4 +146,18 @@ class VoxelsModel(FromFileModel):
     size: Size = Field(
         description="Edge lengths of a cell [length_unit]; the first cell of an array "
         "begins at its origin."
+    )
+
+
+def with_field(shape: type[NamedModel], more: type[FileModel], noun: str) -> Any:
+    """A shape with the field of another model, and the same description.
+
+    Args:
+        shape: Such as SphereModel.
+        more: The other model.
+        noun: What it is then, as in SphereBody.
+    """
+    name = shape.__name__.replace("Model", noun)
+    return create_model(
+        name, __base__=(more, shape), __doc__=shape.__doc__, __module__=__name__
     )

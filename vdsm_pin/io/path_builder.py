@@ -20,7 +20,7 @@ from vdsm_pin.io.path_schema import (
     SplinePart,
     TipPathModel,
 )
-from vdsm_pin.io.posture_builder import PostureBuilder
+from vdsm_pin.io.posture_field import PostureBuilder
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.tables import Table, as_text
 from vdsm_pin.problem.desired_path import Approach, Blocked, DesiredPath, Order
@@ -58,7 +58,9 @@ def read_points(path: Path, digest: Digest) -> FloatArray:
     """
     content = read_bytes(path, limit=MAX_POINT_BYTES)
     digest.update(content)
-    return Table(path, as_text(BytesIO(content)), ("x", "y", "z")).all_rows()
+    table = Table(path, as_text(BytesIO(content)), {*"xyz"}.__contains__)
+    table.choose(("x", "y", "z"))
+    return table.all_rows()
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag
 
-from vdsm_pin.io.posture_schema import Start
+from vdsm_pin.io.posture_field import Start
 from vdsm_pin.io.schema_types import (
     FileModel,
     FileName,

@@ -6,12 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
-from vdsm_pin.io.errors_builder import build_errors
-from vdsm_pin.io.errors_schema import ErrorsModel
-from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.errors_field import ErrorsModel
+from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import MAX_BYTES, Others
 from vdsm_pin.io.path_builder import PathBuilder, spacing_of
@@ -57,7 +55,7 @@ def build_problem(
     Raises:
         InvalidFile: If values that are each in range make no sense together.
     """
-    frame, T_world_base = _frame(model)
+    frame = model.frame
     known = document, frame, folder, digest
     arm = ArmBuilder(*known).build(model.manipulator)
     self_clearance = float(frame.metres(model.required_self_clearance))
@@ -78,7 +76,7 @@ def build_problem(
         scene=scene,
         tip_path=paths.build(model.tip_path) if model.tip_path else None,
         required_clearance=float(frame.metres(model.required_clearance)),
-        T_world_base=T_world_base,
+        T_world_base=frame.pose,
         required_self_clearance=self_clearance,
         tip_tolerance=_tip_tolerance(model, frame, document),
         max_row_change=_row_change(model),
@@ -101,14 +99,6 @@ def joined(
         return Scene((*scene.obstacles, *more)) if more else scene
 
 
-def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:
-    rotation = rotation_from_rpy(radians(model.base.rpy_deg))
-    frame = Frame(model.length_unit, rotation, np.array(model.base.position))
-    T_world_base = np.eye(4)
-    T_world_base[:3, :3], T_world_base[:3, 3] = rotation, frame.metres(frame.origin)
-    return frame, T_world_base
-
-
 def _errors(
     model: ErrorsModel,
     frame: Frame,
@@ -121,7 +111,7 @@ def _errors(
     if isinstance(joint, list) and len(joint) != n_links:
         problem = f"has {len(joint)} values, expected {n_links}: one per joint"
         raise document.invalid(("errors", "joint_deg"), problem)
-    errors = build_errors(model, frame, scene, document)
+    errors = model.box(frame.unit, scene, document)
     with document.naming(("errors",)):
         errors.angles(n_links)
     return errors

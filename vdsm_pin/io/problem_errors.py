@@ -1,7 +1,7 @@
 """Pydantic's complaints in this package's words: field, line, value, expectation."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, get_args
+from typing import Any, Final, TypeVar, get_args
 
 from pydantic import Tag, ValidationError
 from pydantic.fields import FieldInfo
@@ -44,6 +44,21 @@ _WORDS: Final = {
     "string_too_short": "at least {min_length} characters",
 }
 """What is expected, by pydantic's kind of error and with its values."""
+
+
+Model = TypeVar("Model", bound=FileModel)
+
+
+def checked(document: YamlDocument, model: type[Model]) -> Model:
+    """What a document holds, each value checked by itself.
+
+    Raises:
+        InvalidFile: If it is not what the model says; see `first_error`.
+    """
+    try:
+        return model.model_validate(document.data)
+    except ValidationError as error:
+        raise first_error(error, document, model) from None
 
 
 def first_error(

@@ -5,16 +5,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import ValidationError
-
 from vdsm_pin.errors import InvalidFile, UnknownName
 from vdsm_pin.io.frames import Frame
-from vdsm_pin.io.motion_schema import MovableModel
+from vdsm_pin.io.motion_field import MovableModel
 from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.others import OtherReader, Others, ReadRobot, files_of_arm
 from vdsm_pin.io.path_schema import FilePart
 from vdsm_pin.io.problem_builder import build_problem
-from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.problem_errors import checked
 from vdsm_pin.io.problem_schema import ProblemModel
 from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
@@ -60,10 +58,7 @@ def read_problem(
         )
         what = f"is for {others} only; expected manipulator"
         raise ProblemOfRobot(file=path, where=where, problem=what)
-    try:
-        model = ProblemModel.model_validate(document.data)
-    except ValidationError as error:
-        raise first_error(error, document, ProblemModel) from None
+    model = checked(document, ProblemModel)
     stem = "".join(c if c.isalnum() else "_" for c in path.stem[:100])
     digest, folder, of_others = hashlib.sha256(content), path.parent, list[Path]()
 

@@ -6,14 +6,17 @@ are in the file's `length_unit`, angles in degrees; `problem_builder.py` convert
 
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field
 
 from vdsm_pin.arm.manipulator import MAX_LINKS
+from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.arm_schema import ManipulatorField
-from vdsm_pin.io.errors_schema import ErrorsModel
-from vdsm_pin.io.motion_schema import MovableModel
+from vdsm_pin.io.errors_field import ErrorsModel
+from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.motion_field import MovableModel
 from vdsm_pin.io.path_schema import TipPathModel
-from vdsm_pin.io.posture_schema import GoalModel, Start
+from vdsm_pin.io.posture_field import GoalModel, Start
 from vdsm_pin.io.robot_schema import RobotModel
 from vdsm_pin.io.schema_types import (
     FileModel,
@@ -95,30 +98,53 @@ class RatiosModel(FileModel):
     )
 
 
-class ProblemModel(FileModel):
-    """A planning problem for a hyper-redundant manipulator."""
+class AnyProblemModel(FileModel):
+    """What problems of snake arms and of other robots have in common."""
 
     vdsm_problem: Annotated[Literal[1], BeforeValidator(not_bool)] = Field(
         description="Version of this format."
     )
     name: Name | None = Field(
-        default=None, description="Name for reports. Default: the file's."
+        default=None, description="Name for reports. Default: the file's or robot's."
     )
     length_unit: Literal["mm", "m"] = Field(
         description="Unit of every length in this file. Angles are in degrees."
     )
-    manipulator: ManipulatorField = Field(
-        description="Name of a built-in arm (hrm8), or an arm of your own."
-    )
     base: BasePoseModel = Field(
         default=BasePoseModel(),
-        description="Where the rail is. Default: at the origin.",
+        description="Where the rail or root link is. Default: at the origin.",
     )
     obstacles: list[MovableModel] = Field(default=[], description="Solids to avoid.")
     others: list[OtherModel] = Field(
         default=[],
         description="Other snake arms and robots: each link is an obstacle that "
         "moves. Trajectories then need times.",
+    )
+    errors: ErrorsModel = Field(
+        default=ErrorsModel(),
+        description="Every clearance is asked for under them. Default: none.",
+    )
+    required_clearance: NotNegative = Field(
+        description="Between the surfaces of links and obstacles [length_unit]."
+    )
+    required_self_clearance: NotNegative = Field(
+        default=0.0,
+        description="Between the surfaces of links that are not neighbours, or that "
+        "are held apart [length_unit].",
+    )
+
+    @property
+    def frame(self) -> Frame:
+        """The unit of the file and where the base is."""
+        rotation = rotation_from_rpy(radians(self.base.rpy_deg))
+        return Frame(self.length_unit, rotation, np.array(self.base.position))
+
+
+class ProblemModel(AnyProblemModel):
+    """A planning problem for a hyper-redundant manipulator."""
+
+    manipulator: ManipulatorField = Field(
+        description="Name of a built-in arm (hrm8), or an arm of your own."
     )
     tip_path: TipPathModel | None = Field(
         default=None,
@@ -135,17 +161,10 @@ class ProblemModel(FileModel):
         description="Without tip_path: where the motion ends, {tip: [x, y, z]} "
         "[length_unit] or {joints: ...}. Default: anywhere.",
     )
-    errors: ErrorsModel = Field(
-        default=ErrorsModel(),
-        description="Every clearance is asked for under them. Default: none.",
-    )
     ratios: RatiosModel | None = Field(
         default=None,
         description="How strategy `paper` scales the path to the joints. Default: in "
         "the ratios of the arm's lengths, about the rail.",
-    )
-    required_clearance: NotNegative = Field(
-        description="Between the surfaces of arm and obstacles [length_unit]."
     )
     tip_tolerance: Positive | None = Field(
         default=None,
@@ -156,9 +175,4 @@ class ProblemModel(FileModel):
         default=None,
         description="Largest change of a joint angle from row to row [deg]. Default: "
         "not asked for; plans keep 5.",
-    )
-    required_self_clearance: NotNegative = Field(
-        default=0.0,
-        description="Between the surfaces of links that are not neighbours "
-        "[length_unit].",
     )

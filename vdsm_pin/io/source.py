@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, Final, Protocol, cast
 
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.progress import watched
 
 BLOCK: Final = 1 << 20
@@ -79,6 +79,21 @@ def readable(path: Path) -> Iterator[None]:
     except (OSError, EOFError, zlib.error) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name a file where it makes what is done within invalid.
+
+    Raises:
+        InvalidFile: For the block's InvalidInput.
+    """
+    try:
+        yield
+    except InvalidFile:  # which names its place
+        raise
+    except InvalidInput as error:
+        raise InvalidFile(file=path, problem=str(error)) from None
 
 
 def read_bytes(path: Path, *, limit: int) -> bytes:

@@ -8,14 +8,14 @@ lines end in any way. Columns are found by name; what is not asked for is not re
 import csv
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO, Final, TextIO
+from typing import Any, BinaryIO, Final, TextIO
 
 import numpy as np
 import pydantic_core
@@ -64,26 +64,20 @@ class Table:
     Args:
         file: The file, for messages.
         text: Its text, from the start.
-        columns: Names of the columns that are wanted.
-        optional: Of those that are wanted where they are there.
+        known: Whether the name of a column has a meaning; tells what is between them.
 
     Attributes:
         file: The file.
-        columns: Names of the columns read, those wanted first.
+        names: Of all columns, in its order.
+        columns: Names of the columns read.
         ignored: Names of the other columns.
         open_ended: Whether the last line that was read has no line end.
 
     Raises:
-        InvalidFile: If the file is empty or a column is missing or there twice.
+        InvalidFile: If the file is empty, or its header has no end.
     """
 
-    def __init__(
-        self,
-        file: Path,
-        text: TextIO,
-        columns: Sequence[str],
-        optional: Sequence[str] = (),
-    ) -> None:
+    def __init__(self, file: Path, text: TextIO, known: Callable[[str], Any]) -> None:
         self.file, self._text = file, text
         self.open_ended = False
         self._decimal = ""  # the sign of the first number that has one
@@ -91,18 +85,25 @@ class Table:
         if not line:
             raise InvalidFile(file=file, problem="is empty")
         self._check_ends([line], 1)
-        self._between, names = max(
+        self._between, self.names = max(
             ((sign, split(line, sign)) for sign in BETWEEN),
-            key=lambda found: len(set(found[1]) & set(columns)),
+            key=lambda found: len(set(filter(known, found[1]))),
         )
-        self._width = len(names)
-        more = (name for name in optional if name in names)
-        self.columns = (*columns, *more)
-        self.ignored = tuple(name for name in names if name not in self.columns)
-        self._places = self._found(names)
+        self._width = len(self.names)
 
-    def _found(self, names: list[str]) -> list[int]:
-        head = Row(self.file, 1, not self.open_ended)
+    def choose(self, columns: Sequence[str], optional: Sequence[str] = ()) -> None:
+        """Say which columns are read: those that must be there, then others.
+
+        Args:
+            columns: Names of the columns that are wanted.
+            optional: Of those that are wanted where they are there.
+
+        Raises:
+            InvalidFile: If a column is missing or there twice.
+        """
+        names, head = self.names, Row(self.file, 1, not self.open_ended)
+        self.columns = (*columns, *(name for name in optional if name in names))
+        self.ignored = tuple(name for name in names if name not in self.columns)
         for name in self.columns:
             if names.count(name) > 1:
                 problem = f"has the column {name!r} {names.count(name)} times"
@@ -110,7 +111,7 @@ class Table:
             if name not in names:
                 problem = f"has no column {name!r}{self._instead(name)}"
                 raise head.invalid(problem)
-        return [names.index(name) for name in self.columns]
+        self._places = [names.index(name) for name in self.columns]
 
     def _instead(self, name: str) -> str:
         """What stands there that may be meant."""

@@ -130,7 +130,8 @@ def read_trajectory_text(
     columns = column_names(arm.n_links)
     rates, changes = (rate_names(arm.n_links, order) for order in (1, 2))
     more = {"linear": (), "cubic": rates}.get(interpolation, (*rates, *changes))
-    table = Table(file, text, columns, (TIME, *more))
+    table = Table(file, text, {*columns}.__contains__)
+    table.choose(columns, (TIME, *more))
     _check_arm(file, table.ignored, arm)
     found = table.columns
     smooth = _smooth_columns(file, found, (rates, changes), interpolation)

@@ -14,9 +14,9 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.source import decode, read_bytes
+from vdsm_pin.io.source import decode, naming, read_bytes
 from vdsm_pin.tolerances import TOLERANCES
 
 MAX_BYTES: Final = 16 << 20
@@ -53,10 +53,8 @@ def read_urdf_arm(path: Path) -> UrdfArm:
     """
     content = read_bytes(path, limit=MAX_BYTES)
     text = decode(content, path)
-    try:
+    with naming(path):
         validate_urdf(text)
-    except InvalidInput as error:
-        raise InvalidFile(file=path, problem=str(error)) from None
     from yourdfpy import URDF  # slow to import, and only such files need it
 
     robot = URDF.load(

@@ -92,10 +92,9 @@ def _read(path: Path, columns: tuple[str, ...]) -> tuple[FloatArray, tuple[str, 
     """All rows: waypoint, on_path, path_m, the columns, shape (n, 3 + m); notes."""
     check_is_file(path)
     with readable(path), open_text(path) as text:
-        missing = set(PLACE) - set(Table(path, text, (WAYPOINT, *columns)).ignored)
-        places = () if len(missing) == len(PLACE) else PLACE
-        text.seek(0)
-        found = Table(path, text, (WAYPOINT, *places, *columns))
+        found = Table(path, text, {WAYPOINT, *columns}.__contains__)
+        places = PLACE if set(PLACE) & set(found.names) else ()
+        found.choose((WAYPOINT, *places, *columns))
         table = read_waypoints(found)
     for name in columns:
         near = np.abs(table[name]) <= TOLERANCES.scene_extent

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 from itertools import zip_longest
 from numbers import Real
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -47,25 +47,6 @@ class JointError:
     name: str
     turn: float = 0.0
     shift: float = 0.0
-
-    @classmethod
-    def of(
-        cls, turns_deg: Mapping[str, float], shifts: Mapping[str, float]
-    ) -> tuple["JointError", ...]:
-        """The errors of joints by name.
-
-        Args:
-            turns_deg: Errors of joints that turn; [deg].
-            shifts: Errors of joints that slide; [m].
-        """
-        return tuple(
-            cls(
-                name,
-                float(np.deg2rad(turns_deg.get(name, 0.0))),
-                float(shifts.get(name, 0.0)),
-            )
-            for name in dict.fromkeys((*turns_deg, *shifts))
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,32 +201,76 @@ class TypedErrorBox(ErrorBox):
         slide_mm: float | Mapping[str, float] = 0.0,
     ) -> None:
         """The box in radians and metres."""
-        joints, slides = isinstance(joint_deg, Mapping), isinstance(slide_mm, Mapping)
-        turns = _by_name("joint_deg", joint_deg if joints else NOTHING)
-        shifts = _by_name("slide_mm", slide_mm if slides else NOTHING)
+        joint = _by_name if isinstance(joint_deg, Mapping) else _numbers
+        slide = _by_name if isinstance(slide_mm, Mapping) else _plain
         away = _by_name("obstacles_mm", obstacles_mm)
         turned = _by_name("obstacles_deg", obstacles_deg)
-        with called("ErrorBox: joint_deg"):
-            angles = np.deg2rad(frozen(0.0 if joints else joint_deg))
-        super().__init__(
-            joint=0.0 if angles.ndim else float(angles),
-            base=_plain("base_mm", base_mm) / MM_PER_M,
-            obstacle=_plain("obstacle_mm", obstacle_mm) / MM_PER_M,
-            base_turn=float(np.deg2rad(_plain("base_deg", base_deg))),
-            joints=tuple((e, e) for e in (angles.tolist() if angles.ndim else ())),
-            obstacles=tuple(
-                ObstacleError(
-                    name,
-                    away.get(name, 0.0) / MM_PER_M,
-                    float(np.deg2rad(turned.get(name, 0.0))),
-                )
+        fields = in_si(
+            MM_PER_M,
+            joint_deg=joint("joint_deg", joint_deg),
+            slide=slide("slide_mm", slide_mm),
+            base=_plain("base_mm", base_mm),
+            base_deg=_plain("base_deg", base_deg),
+            obstacle=_plain("obstacle_mm", obstacle_mm),
+            obstacles=[
+                (name, away.get(name, 0.0), turned.get(name, 0.0))
                 for name in dict.fromkeys((*away, *turned))
-            ),
-            slide=0.0 if slides else _plain("slide_mm", slide_mm) / MM_PER_M,
-            named=JointError.of(
-                turns, {name: value / MM_PER_M for name, value in shifts.items()}
-            ),
+            ],
         )
+        super().__init__(**fields)
+
+
+def in_si(
+    per_metre: float,
+    *,
+    joint_deg: float | Sequence[float] | Mapping[str, float],
+    slide: float | Mapping[str, float],
+    base: float,
+    base_deg: float,
+    obstacle: float,
+    obstacles: Sequence[tuple[str, float, float]],
+) -> dict[str, Any]:
+    """The fields of an error box from degrees and lengths in some unit.
+
+    Args:
+        per_metre: Of that unit.
+        joint_deg: Of every joint angle, of each from the base, or of some by name.
+        slide: Of every joint that slides, or of some by name.
+        base: Displacement of the base.
+        base_deg: Its turn.
+        obstacle: Displacement of every obstacle's surface.
+        obstacles: Names, shifts and turns of single ones; the turns in degrees.
+    """
+    turns = joint_deg if isinstance(joint_deg, Mapping) else NOTHING
+    shifts = slide if isinstance(slide, Mapping) else NOTHING
+    each = joint_deg if isinstance(joint_deg, Sequence) else ()
+    plain = 0.0 if isinstance(joint_deg, Mapping | Sequence) else joint_deg
+    return {
+        "joint": float(np.deg2rad(plain)),
+        "base": base / per_metre,
+        "obstacle": obstacle / per_metre,
+        "base_turn": float(np.deg2rad(base_deg)),
+        "joints": tuple((error, error) for error in np.deg2rad(each).tolist()),
+        "obstacles": tuple(
+            ObstacleError(name, shift / per_metre, float(np.deg2rad(turn)))
+            for name, shift, turn in obstacles
+        ),
+        "slide": 0.0 if isinstance(slide, Mapping) else slide / per_metre,
+        "named": tuple(
+            JointError(
+                name,
+                float(np.deg2rad(turns.get(name, 0.0))),
+                shifts.get(name, 0.0) / per_metre,
+            )
+            for name in dict.fromkeys((*turns, *shifts))
+        ),
+    }
+
+
+def _numbers(name: str, value: object) -> Any:
+    """One number, or a list of them."""
+    with called(f"ErrorBox: {name}"):
+        return frozen(value).tolist()
 
 
 def _plain(name: str, value: object) -> float:

@@ -224,9 +224,6 @@ def read_cell(path: str | Path) -> Cell:
     file = read_cell_file(Path(path))
     robot = read_robot(file.robot)
     required, required_self = file.required
-    pose = np.eye(4)
-    pose[:3, :3] = file.frame.rotation
-    pose[:3, 3] = file.frame.metres(file.model.base.position)
     found = file.scene(_size(robot), _others(robot), read_other)
     cell = Cell(
         robot=robot,
@@ -234,7 +231,7 @@ def read_cell(path: str | Path) -> Cell:
         required_clearance=required,
         required_self_clearance=required_self,
         name=file.model.name or "",
-        T_world_base=frozen(pose),
+        T_world_base=frozen(file.frame.pose),
     ).read_from(file.source(robot.more_files, found))
     with file.document.naming(("errors",)):
         return cell.under(file.errors(found.scene))

@@ -8,32 +8,26 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Final, Literal, NamedTuple, TypeAlias, get_args
+from typing import Final, NamedTuple, TypeAlias, get_args
 
-import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import Field
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.body_schema import MAX_PARTS
-from vdsm_pin.io.errors_builder import build_errors
-from vdsm_pin.io.errors_schema import ErrorsModel
-from vdsm_pin.io.frames import Frame, radians
-from vdsm_pin.io.motion_schema import MovableModel
+from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import OtherReader, ReadRobot
 from vdsm_pin.io.problem_builder import joined
-from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.problem_errors import checked
 from vdsm_pin.io.problem_file import files_of_obstacles
-from vdsm_pin.io.problem_schema import BasePoseModel, OtherModel, not_bool
+from vdsm_pin.io.problem_schema import AnyProblemModel
 from vdsm_pin.io.robot_schema import CoverKind, RobotModel
-from vdsm_pin.io.schema_types import Name, NotNegative
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, read_scene_with_files
+from vdsm_pin.robots.scene_files import MAX_BYTES, read_scene_with_files
 
 Named: TypeAlias = tuple[tuple[str, Path], ...]
 """Names of obstacles that have a file of their own, with it."""
@@ -177,39 +171,14 @@ def solids_of(bodies: CoverKind | None, parts: int | None) -> MeshCover:
     return MeshCover(cover, parts or PARTS)
 
 
-class CellModel(SceneModel):
+class CellModel(AnyProblemModel):
     """What a motion of a robot is held to."""
 
-    vdsm_problem: Annotated[Literal[1], BeforeValidator(not_bool)] = Field(
-        description="Version of this format."
-    )
-    name: Name | None = Field(default=None, description="Default: the robot's.")
     robot: RobotModel = Field(description="In place of a manipulator.")
-    base: BasePoseModel = Field(
-        default=BasePoseModel(),
-        description="Where the root link is. Default: at the origin.",
-    )
-    obstacles: list[MovableModel] = Field(default=[], description="Solids to avoid.")
     scene: str | None = Field(
         default=None,
         description="File of more obstacles, in the frame of the root link: YAML with "
         "obstacles, a PlanningScene of MoveIt, or a world in MJCF.",
-    )
-    others: list[OtherModel] = Field(
-        default=[],
-        description="Other robots and snake arms: each link is an obstacle that moves. "
-        "Trajectories then need times.",
-    )
-    required_clearance: NotNegative = Field(
-        description="Between the surfaces of links and obstacles [length_unit]."
-    )
-    required_self_clearance: NotNegative = Field(
-        default=0.0, description="Between links that are held apart [length_unit]."
-    )
-    errors: ErrorsModel = Field(
-        default=ErrorsModel(),
-        description="How far joints, base and obstacles may be off. Default: not at "
-        "all.",
     )
 
 
@@ -235,9 +204,7 @@ class CellFile:
     @cached_property
     def frame(self) -> Frame:
         """Unit of the file and pose of the root link."""
-        base = self.model.base
-        rotation = rotation_from_rpy(radians(base.rpy_deg))
-        return Frame(self.model.length_unit, rotation, np.array(base.position))
+        return self.model.frame
 
     @property
     def required(self) -> tuple[float, float]:
@@ -278,7 +245,7 @@ class CellFile:
         Raises:
             InvalidFile: If they name an obstacle that there is not.
         """
-        return build_errors(self.model.errors, self.frame, scene, self.document)
+        return self.model.errors.box(self.frame.unit, scene, self.document)
 
     def source(self, of_links: Iterable[Path], scene: "CellScene") -> ProblemSource:
         """All files that it is read from, those of links and obstacles too."""
@@ -307,10 +274,7 @@ def read_cell_file(path: Path) -> CellFile:
         InvalidFile: If the file breaks its contract.
     """
     document = read_yaml(read_text(path, limit=MAX_BYTES), file=path)
-    try:
-        return CellFile(path, document, CellModel.model_validate(document.data))
-    except ValidationError as error:
-        raise first_error(error, document, CellModel) from None
+    return CellFile(path, document, checked(document, CellModel))
 
 
 def source_of(files: tuple[Path, ...], of_obstacles: Named) -> ProblemSource:

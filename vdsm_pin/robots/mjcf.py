@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
-from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.source import check_is_file, naming
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.robots.mjcf_size import check_size
 
@@ -29,12 +29,8 @@ def read_mjcf(file: Path) -> tuple[Scene, tuple[Path, ...]]:
         problem = "has a name that is not UTF-8 text, which mujoco does not open"
         raise InvalidFile(file=file, problem=problem)
     included = check_size(file)
-    try:
+    with naming(file):
         return Scene(tuple(_solids(file))), included
-    except InvalidFile:
-        raise
-    except InvalidInput as error:
-        raise InvalidFile(file=file, problem=str(error)) from None
 
 
 def load_mujoco() -> Any:

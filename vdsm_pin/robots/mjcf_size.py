@@ -8,6 +8,7 @@ from typing import Final
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.source import read_bytes
+from vdsm_pin.io.xml_reader import read_xml
 
 MAX_BYTES: Final = 64 << 20
 """Largest file that is read; [bytes]."""
@@ -50,10 +51,7 @@ def _elements(file: Path, folder: Path, seen: dict[Path, None]) -> float:
     if file in seen or not file.is_file():  # which mujoco tells
         return 0.0
     seen[file] = None
-    try:
-        root = ET.fromstring(read_bytes(file, limit=MAX_BYTES))
-    except ET.ParseError as error:
-        raise InvalidFile(file=file, problem=f"is not XML: {error}") from None
+    root = read_xml(read_bytes(file, limit=MAX_BYTES), file)
 
     def named(element: ET.Element) -> float:
         return _elements(folder / element.get("file", ""), folder, seen)

@@ -6,16 +6,15 @@ from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_quaternion
 from vdsm_pin.geometry.solids import Box, Cylinder, HalfSpace, Mesh, Sphere
 from vdsm_pin.io.frames import Frame
-from vdsm_pin.io.motion_schema import MovableModel
+from vdsm_pin.io.motion_field import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.places import Place
-from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.problem_errors import checked
 from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.source import read_text
@@ -81,10 +80,7 @@ def read_scene_with_files(
 def _ours(
     document: YamlDocument, path: Path, robot_size: float
 ) -> tuple[Scene, tuple[tuple[str, Path], ...]]:
-    try:
-        model = SceneModel.model_validate(document.data)
-    except ValidationError as error:
-        raise first_error(error, document, SceneModel) from None
+    model = checked(document, SceneModel)
     frame = Frame(model.length_unit, np.eye(3), np.zeros(3))
     digest = hashlib.sha256()
     builder = ObstacleBuilder(document, frame, path.parent, digest, robot_size)
@@ -113,10 +109,8 @@ def _moveit(document: YamlDocument, links: Collection[str]) -> Scene:
     _check_frames(things, links)
     for thing in things:
         found += _solids(thing)
-    try:
+    with whole["world"].naming():
         return Scene(tuple(found))
-    except InvalidInput as error:
-        raise whole["world"].invalid(str(error)) from None
 
 
 def _check_frames(things: Sequence[Place], links: Collection[str]) -> None:
@@ -147,10 +141,11 @@ def _solids(thing: Place) -> list[Obstacle]:
         problem = f"{name!r} has no shape"
         raise thing.invalid(problem)
     names = [name if count == 1 else f"{name}/{k}" for k in range(1, count + 1)]
-    return [
-        reader(shape, one, base @ _pose(pose))
-        for one, (reader, shape, pose) in zip(names, shapes, strict=True)
-    ]
+    found = list[Obstacle]()
+    for one, (reader, shape, pose) in zip(names, shapes, strict=True):
+        with shape.naming():
+            found.append(reader(shape, one, base @ _pose(pose)))
+    return found
 
 
 def _primitive(shape: Place, name: str, placement: FloatArray) -> Obstacle:
@@ -159,20 +154,14 @@ def _primitive(shape: Place, name: str, placement: FloatArray) -> Obstacle:
     kind = kinds.get(kind, kind) if not isinstance(kind, bool) else kind
     turn, centre = placement[:3, :3], placement[:3, 3]
     sizes = shape["dimensions"]
-    try:
-        match kind:
-            case "box":
-                return Box(name, centre, turn, sizes.numbers(3) / 2.0)
-            case "sphere":
-                return Sphere(name, centre, float(sizes.numbers(1)[0]))
-            case "cylinder":
-                height, radius = sizes.numbers(2)
-                axis = turn[:, 2]
-                return Cylinder(name, centre, axis, float(height) / 2.0, float(radius))
-    except InvalidFile:
-        raise
-    except InvalidInput as error:
-        raise shape.invalid(str(error)) from None
+    match kind:
+        case "box":
+            return Box(name, centre, turn, sizes.numbers(3) / 2.0)
+        case "sphere":
+            return Sphere(name, centre, float(sizes.numbers(1)[0]))
+        case "cylinder":
+            height, radius = sizes.numbers(2).tolist()
+            return Cylinder(name, centre, turn[:, 2], height / 2.0, radius)
     problem = f"is {kind!r}, expected {', '.join(kinds.values())}"
     raise shape["type"].invalid(problem)
 
@@ -194,10 +183,7 @@ def _mesh(mesh: Place, name: str, placement: FloatArray) -> Obstacle:
     corners = [_named(one, "xyz") for one in mesh["vertices"].items()]
     triangles = [_triangle(one, len(corners)) for one in mesh["triangles"].items()]
     vertices = np.reshape(corners, (-1, 3)) @ placement[:3, :3].T + placement[:3, 3]
-    try:
-        return Mesh(name, vertices, np.array(triangles, np.int64).reshape(-1, 3))
-    except InvalidInput as error:
-        raise mesh.invalid(str(error)) from None
+    return Mesh(name, vertices, np.array(triangles, np.int64).reshape(-1, 3))
 
 
 def _triangle(triangle: Place, count: int) -> FloatArray:

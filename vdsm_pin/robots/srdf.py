@@ -9,6 +9,7 @@ from typing import Final, Literal, TypeAlias, cast
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.tables import listed
+from vdsm_pin.io.xml_reader import read_xml
 
 MAX_BYTES: Final = 16 << 20
 
@@ -41,11 +42,7 @@ class Srdf:
 
     def __init__(self, path: Path, robot: ET.Element) -> None:
         self._path = path
-        try:
-            self._root = ET.fromstring(read_text(path, limit=MAX_BYTES))
-        except ET.ParseError as error:
-            problem = f"SRDF is not XML: {error}"
-            raise self._invalid(problem) from None
+        self._root = read_xml(read_text(path, limit=MAX_BYTES), path)
         if self._root.tag != "robot":
             problem = f"root element is <{self._root.tag}>, expected <robot>"
             raise self._invalid(problem)

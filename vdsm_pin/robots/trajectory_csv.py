@@ -11,7 +11,7 @@ import numpy as np
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import readable
-from vdsm_pin.io.tables import BETWEEN, Table, listed, open_text, quoted, split
+from vdsm_pin.io.tables import Table, open_text, quoted
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.robots.model import Robot, RobotJoint, Values
 from vdsm_pin.units import MM_PER_M
@@ -32,13 +32,17 @@ def read_csv(
     file: File, joints: Sequence[RobotJoint], values: Values
 ) -> JointTrajectory:
     """The joints that move and, without rates, others that `values` has."""
-    with open_text(file) as text:
-        head = text.readline()
     known = {joint.name for joint in joints}
-    names = max(
-        (split(head, sign) for sign in BETWEEN),
-        key=lambda found: len(known & _stated(found).keys()),
-    )
+    with readable(file), open_text(file) as text:
+        table = Table(file, text, lambda name: _stated([name]).keys() & known)
+        return _read(table, joints, values)
+
+
+def _read(
+    table: Table, joints: Sequence[RobotJoint], values: Values
+) -> JointTrajectory:
+    """The same of a table whose header alone was read."""
+    file, names, known = table.file, table.names, {joint.name for joint in joints}
     stated = _stated(names)
     _check_once(file, names, stated)
     columns, factors = _position_columns(file, stated, joints)
@@ -53,10 +57,10 @@ def read_csv(
         raise InvalidFile(file=file, where="line 1", problem=problem)
     wanted = [*columns, *times, *smooth[0], *smooth[1]]
     more = [stated[one][0] for one in others]
-    with readable(file), open_text(file) as text:
-        table, n = Table(file, text, [*wanted, *more]).all_rows(), len(columns)
-    _check_degrees(file, table, columns)
-    rest = table[:, n + len(times) :]
+    table.choose([*wanted, *more])
+    rows, n = table.all_rows(), len(columns)
+    _check_degrees(file, rows, columns)
+    rest = rows[:, n + len(times) :]
     parts = [
         rest[:, k * n : (k + 1) * n]
         * np.array([UNITS[m[3]] for name in found if (m := _SMOOTH.fullmatch(name))])
@@ -65,14 +69,13 @@ def read_csv(
         for k, found in enumerate(smooth)
     ]
     factors += [UNITS[stated[one][1]] for one in others]
-    unread = [name for name in names if name not in (*wanted, *more)]
     return JointTrajectory(
         (*(joint.name for joint in joints), *others),
-        np.hstack([table[:, :n], table[:, len(wanted) :]]) * np.array(factors),
-        table[:, n] if times else None,
+        np.hstack([rows[:, :n], rows[:, len(wanted) :]]) * np.array(factors),
+        rows[:, n] if times else None,
         parts[0],
         parts[1],
-        (f"columns that are not read: {listed(unread)}",) if unread else (),
+        table.notes,
         tuple(name for name, (_, unit) in stated.items() if unit == "deg"),
     )
 

@@ -4,7 +4,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io.source import naming
 from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
@@ -28,10 +29,8 @@ def read_robot(files: RobotFiles) -> Robot:
     """
     urdf, group, solids = files.urdf, files.group, files.solids
     text, included = urdf_text(urdf, files.package_dirs)
-    try:
+    with naming(urdf):
         validate_urdf(text, geometry_only=True)
-    except InvalidInput as error:
-        raise InvalidFile(file=urdf, problem=str(error)) from None
     document = ET.fromstring(text)
     more = Srdf(files.srdf, document) if files.srdf is not None else None
     if group is not None and more is None:

@@ -4,13 +4,14 @@ The paper gives none of these numbers. The defaults are assumptions, each with i
 reason, to be changed in a file and swept; none was fitted to a result.
 """
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.problem_errors import checked
 from vdsm_pin.io.schema_types import FileModel, NotNegative, Number, Positive
 from vdsm_pin.io.source import decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
@@ -159,8 +160,6 @@ def read_settings(path: Path) -> Settings:
         InvalidFile: If the file or a value breaks the contract.
     """
     document = read_yaml(decode(read_bytes(path, limit=MAX_BYTES), path), file=path)
-    data: Any = document.data if document.data is not None else {}
-    try:
-        return Settings.model_validate(data)
-    except ValidationError as error:
-        raise first_error(error, document, Settings) from None
+    if document.data is None:
+        document = replace(document, data={})
+    return checked(document, Settings)

@@ -4,9 +4,9 @@ Everything that has faces is read or refused: nothing is left out silently.
 """
 
 import math
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator
 from typing import Final
+from xml.etree.ElementTree import Element as _Element
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.faces import cut_faces
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
 from vdsm_pin.io.meshes.scene import Part, Placed, composed, strip_triangles
+from vdsm_pin.io.xml_reader import read_xml
 
 MAX_BYTES: Final = 256 << 20
 """Largest file read, as XML takes several times its size; [bytes]."""
@@ -22,7 +23,6 @@ MAX_NODES: Final = 100_000
 
 _LARGEST_INT: Final = 1 << 40
 
-_Element = ElementTree.Element
 _FACES: Final = frozenset({"triangles", "polylist", "polygons", "tristrips", "trifans"})
 _LINES: Final = frozenset({"lines", "linestrips"})
 _OTHERS: Final = frozenset({"convex_mesh", "spline", "brep"})
@@ -40,11 +40,7 @@ def read_dae(stream: MeshStream) -> RawMesh:
     content = stream.content.read()
     if b"<!DOCTYPE" in content:  # whose entities may grow without end
         raise stream.invalid(problem="has a DOCTYPE, expected plain XML")
-    try:
-        root = ElementTree.fromstring(content)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        problem = f"is no XML: {' '.join(str(error).split())[:100]}"
-        raise stream.invalid(problem) from None
+    root = read_xml(content, stream.path)
     if _tag(root) != "COLLADA":
         problem = f"is no COLLADA file: its root is {_tag(root)[:40]!r}"
         raise stream.invalid(problem)

@@ -1,18 +1,55 @@
-"""Starts and goals of a problem file to a `Posture` in the base frame."""
+"""Where an arm stands in a problem file, its start and its goal: to a `Posture`."""
 
 from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
+from pydantic import Discriminator, Field, Tag
 
 from vdsm_pin.arm.kinematics import joint_centres, link_angles
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io import posture_schema as schema
 from vdsm_pin.io.frames import radians
 from vdsm_pin.io.reading import Reading
+from vdsm_pin.io.schema_types import FileModel, Number, Vector
 from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.problem.planning_problem import Posture
 from vdsm_pin.tolerances import TOLERANCES
+
+
+class JointsModel(FileModel):
+    """Joint values of the whole arm."""
+
+    x0: Number = Field(description="Base position on the rail [length_unit].")
+    alpha_deg: list[Number] = Field(description="Yaw of joints 1..N [deg].")
+    theta_deg: list[Number] = Field(description="Pitch of joints 1..N [deg].")
+
+
+class StartJointsModel(FileModel):
+    """The start given by its joint values."""
+
+    joints: JointsModel = Field(description="Joint values at the start.")
+
+
+def _list_or_not(value: Any) -> str:
+    return "point" if isinstance(value, list) else "joint values"
+
+
+Start: TypeAlias = Annotated[
+    Annotated[Vector, Tag("point")] | Annotated[StartJointsModel, Tag("joint values")],
+    Discriminator(_list_or_not),
+]
+
+
+class GoalModel(FileModel):
+    """Where a motion without tip path ends, one of the two."""
+
+    tip: Vector | None = Field(
+        default=None, description="Where the tip is at the end [length_unit]."
+    )
+    joints: JointsModel | None = Field(
+        default=None, description="Joint values at the end."
+    )
 
 
 @dataclass(frozen=True)
@@ -21,21 +58,19 @@ class PostureBuilder(Reading):
 
     arm: Manipulator
 
-    def start(
-        self, model: list[float] | schema.StartJointsModel, at: Location
-    ) -> Posture:
+    def start(self, model: list[float] | StartJointsModel, at: Location) -> Posture:
         """Where a motion begins: the tip of the straight arm, or joint values.
 
         Raises:
             InvalidFile: If the arm cannot stand there.
         """
-        if isinstance(model, schema.StartJointsModel):
+        if isinstance(model, StartJointsModel):
             return self._posture(model.joints, (*at, "joints"))
         tip = self.frame.point(model)
         self._check_straight(tip, at)
         return Posture(tip)
 
-    def goal(self, model: schema.GoalModel, at: Location) -> Posture:
+    def goal(self, model: GoalModel, at: Location) -> Posture:
         """Where a motion ends: the tip, or joint values.
 
         Raises:
@@ -51,11 +86,11 @@ class PostureBuilder(Reading):
         self._check_reach(tip, (*at, "tip"))
         return Posture(tip)
 
-    def _posture(self, model: schema.JointsModel, at: Location) -> Posture:
+    def _posture(self, model: JointsModel, at: Location) -> Posture:
         joints = self._joints(model, at)
         return Posture(self._tip(joints), joints)
 
-    def _joints(self, model: schema.JointsModel, at: Location) -> FloatArray:
+    def _joints(self, model: JointsModel, at: Location) -> FloatArray:
         n, x0 = self.arm.n_links, float(self.frame.metres(model.x0))
         if not self._on_rail(x0):
             problem = f"is {self.frame.shown(x0)}, expected {self._rail()}"

@@ -1,0 +1,87 @@
+"""How far things may be off in a problem file, of an arm or of any other robot."""
+
+from pydantic import Field
+
+from vdsm_pin.geometry.solids import HalfSpace
+from vdsm_pin.io.schema_types import FileModel, Name, NotNegative
+from vdsm_pin.io.yaml_reader import YamlDocument
+from vdsm_pin.problem.error_boxes import ErrorBox, in_si
+from vdsm_pin.problem.scene import Scene, solid_of
+from vdsm_pin.units import UNITS_PER_METRE
+
+
+class ObstacleErrorModel(FileModel):
+    """How far one obstacle may be off."""
+
+    name: Name = Field(description="Of the obstacle.")
+    shift: NotNegative = Field(
+        default=0.0,
+        description="In any direction [length_unit]; counts where it is larger than "
+        "that of all obstacles.",
+    )
+    turn_deg: NotNegative = Field(
+        default=0.0,
+        description="About any axis through the middle of the box around its corners "
+        "[deg]; not of a half_space.",
+    )
+
+
+class ErrorsModel(FileModel):
+    """How far the real motion, its base and the obstacles may be off."""
+
+    joint_deg: NotNegative | list[NotNegative] | dict[str, NotNegative] = Field(
+        default=0.0,
+        description="Of every alpha and theta, either way [deg]; a list has a value "
+        "per joint, from the base. Of a robot: of every joint that turns, or of some "
+        "by name.",
+    )
+    slide: NotNegative | dict[str, NotNegative] = Field(
+        default=0.0,
+        description="Of a robot: of every joint that slides, or of some by name "
+        "[length_unit].",
+    )
+    base: NotNegative = Field(
+        default=0.0, description="Shift of the base, in any direction [length_unit]."
+    )
+    base_deg: NotNegative = Field(
+        default=0.0, description="Turn of the base about its origin [deg]."
+    )
+    obstacle: NotNegative = Field(
+        default=0.0, description="Of every obstacle's surface [length_unit]."
+    )
+    obstacles: list[ObstacleErrorModel] = Field(
+        default=[], description="Of single obstacles."
+    )
+
+    def box(self, unit: str, scene: Scene, document: YamlDocument) -> ErrorBox:
+        """The errors under which every clearance is asked for.
+
+        Args:
+            unit: Of the file's lengths.
+            scene: The obstacles.
+            document: The file, for messages.
+
+        Raises:
+            InvalidFile: If they name an obstacle that there is not, or turn a
+                half-space.
+        """
+        solids = {one.name: solid_of(one) for one in scene.obstacles}
+        for i, one in enumerate(self.obstacles):
+            at = ("errors", "obstacles", i)
+            if one.name not in solids:
+                known = ", ".join(solids) or "none"
+                problem = f"is {one.name!r}, expected one of {known}"
+                raise document.invalid((*at, "name"), problem)
+            if one.turn_deg and isinstance(solids[one.name], HalfSpace):
+                problem = "is of a half_space, which has no middle to turn about"
+                raise document.invalid((*at, "turn_deg"), problem)
+        fields = in_si(
+            UNITS_PER_METRE[unit],
+            joint_deg=self.joint_deg,
+            slide=self.slide,
+            base=self.base,
+            base_deg=self.base_deg,
+            obstacle=self.obstacle,
+            obstacles=[(one.name, one.shift, one.turn_deg) for one in self.obstacles],
+        )
+        return ErrorBox(**fields)
