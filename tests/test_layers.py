@@ -56,7 +56,7 @@ READING = {
     *("problem.scene", "problem.trajectory"),
     *("problem.error_boxes",),
     *("io.problem_file", "io.source", "io.trajectory_file", "io.mesh_file"),
-    "io.others",
+    *("io.others", "io.xml_reader"),
     *("arm.urdf_validator", "robots.files", "robots.joint_limits", "robots.model"),
     *("robots.srdf", "robots.trajectory_files", "robots.xacro"),
 }
@@ -120,7 +120,7 @@ def test_imports_go_downwards(path: Path) -> None:
 
 @pytest.mark.parametrize("path", MODULES, ids=ids)
 def test_only_the_upper_layers_know_robotics_libraries(path: Path) -> None:
-    if own_layer(path) in ROBOTICS_ALLOWED or ids(path) == "io/urdf_arm.py":
+    if own_layer(path) in ROBOTICS_ALLOWED:
         return
     found = {name.split(".")[0] for name in imported(path)} & ROBOTICS
     assert not found

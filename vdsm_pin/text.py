@@ -5,6 +5,7 @@ there that move a cursor, hide or turn text round, or that no encoding can write
 message passes through here first.
 """
 
+import math
 import os
 import sys
 from pathlib import Path
@@ -28,6 +29,18 @@ def printable(text: str) -> str:
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
     )
+
+
+def plain_number(text: str) -> float:
+    """A finite number as every program reads it; NaN for anything else.
+
+    Python alone reads 1_0, and digits of other alphabets.
+    """
+    try:
+        value = float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
 
 
 def show_everything() -> None:

@@ -344,6 +344,30 @@ BAD = {
         pcd("binary_compressed", struct.pack("<II", 4, 36) + b"\xff\x00\x00\x01"),
         "compressed data that is damaged",
     ),
+    **{
+        f"count{k}.pcd": (
+            pcd("binary", b"0" * 36).replace(b"COUNT 1", b"COUNT %d" % count),
+            "expected FIELDS with x y z, SIZE, TYPE, COUNT from 1",
+        )
+        for k, count in enumerate((0, 1 << 20, (1 << 31) - 1, 10**10))
+    },
+    **{
+        f"head{k}.npy": (
+            b"\x93NUMPY\x01\0" + struct.pack("<H", len(head)) + head,
+            "is no array of numbers",
+        )
+        for k, head in enumerate(
+            (
+                b"(",
+                b"-" * 5000 + b"1",
+                b"{b'descr': 1, 'shape': 2}",
+                b"{'descr': '<f8', 'fortran_order': False, 'shape': (True, 3)}",
+                b"{'descr': '<f8', 'fortran_order': False, 'shape': (1%s, 3)}"
+                % (b"0" * 30),
+            )
+        )
+    },
+    "zip.npy": (b"PK\x03\x04" + bytes(40), "is no array of numbers"),
     "q.ply": (FILES["j.ply"].replace(b"float z", b"float w"), "has no x, y, z"),
     "r.pcd": (pcd("ascii", b"", 0), "has no point"),
     "s.pcd": (pcd("ascii", lines(np.hstack([POINTS, POINTS]))), "line 12: has 6 val"),

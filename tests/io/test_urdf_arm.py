@@ -1,5 +1,6 @@
 """An arm written as URDF comes back as it was; another is refused by its joint."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -127,6 +128,31 @@ def test_another_robot_is_refused_by_its_joint(
     with pytest.raises(InvalidFile, match=said) as found:
         read_urdf_arm(file)
     assert str(file) in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("<link ", '<material name="m"><color rgba="x"/></material><link '),
+        ("<link ", f"{'<x>' * 300}{'</x>' * 300}<link "),
+        ("</joint>", f"{'<x>' * 300}{'</x>' * 300}</joint>"),
+        ("</joint>", '<safety_controller soft_lower_limit="x"/></joint>'),
+        ("<geometry>", "<geometry><?what this?>"),
+        ("<link ", '<link drake:colour="red" '),
+        ('<?xml version="1.0"?>', '<?xml version="1.0" encoding="utf-16"?>'),
+        ('<?xml version="1.0"?>', '<?xml version="1.0" encoding="foo"?>'),
+    ],
+)
+def test_what_says_nothing_of_the_arm_is_passed_over(
+    tmp_path: Path, old: str, new: str
+) -> None:
+    """Oracle: the same file without."""
+    text, file = urdf_text(built_in("hrm8")), tmp_path / "arm.urdf"
+    arms = []
+    for one in (text, text.replace(old, new, 1)):
+        file.write_text(one)
+        arms.append(repr(replace(read_urdf_arm(file), content=b"")))
+    assert arms[0] == arms[1]
 
 
 def test_a_robot_with_two_hands_is_no_chain(tmp_path: Path) -> None:

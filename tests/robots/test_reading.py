@@ -103,6 +103,69 @@ def test_prefixes_that_nothing_declares_are_read_as_ros_does(tmp_path: Path) -> 
     assert "http://drake.mit.edu" in note
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("<robot ", '<robot xml:lang="en" '),
+        ("<robot ", "<!-- once <robot name='x'> --><robot "),
+        ("<robot ", '<?xml version="1.0" encoding="foo"?><robot '),
+    ],
+)
+def test_prefixes_are_declared_where_they_must_be(
+    tmp_path: Path, old: str, new: str
+) -> None:
+    """Oracle: the same robot without."""
+    text = URDF.replace(old, new, 1)
+    for more in (text, text.replace("<limit ", '<limit drake:acceleration="2" ', 1)):
+        robot = read_robot(RobotFiles(write(tmp_path, "odd.urdf", more)))
+        same = read_robot(RobotFiles(write(tmp_path, "u.urdf", URDF)))
+        assert repr(robot.tree) == repr(same.tree)
+
+
+def test_the_order_of_joints_and_groups_does_not_matter(tmp_path: Path) -> None:
+    """A chain written from its end; groups of which each names another twice."""
+    n = 400
+    links = [f'<link name="l{k}"/>' for k in range(1, n)]
+    joints = [
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/>'
+        f'<child link="l{k + 1}"/><origin xyz="0 0 1"/>'
+        + (f'<mimic joint="j{k - 1}"/>' if k else "")
+        + "</joint>"
+        for k in range(n)
+    ]
+    ball = '<collision><geometry><sphere radius="1"/></geometry></collision>'
+    ends = [f'<link name="l{k}">{ball}</link>' for k in (0, n)]
+    robots = []
+    for some in (joints, joints[::-1]):
+        text = f"<robot name='r'>{''.join([*links, *some, *ends])}</robot>"
+        robots.append(read_robot(RobotFiles(write(tmp_path, "r.urdf", text))))
+    assert repr(robots[0].tree) == repr(robots[1].tree)
+    assert robots[0].values == robots[1].values
+    groups = [
+        f'<group name="g{k}">{2 * f"<group name={chr(34)}g{k + 1}{chr(34)}/>"}</group>'
+        for k in range(1500)
+    ]
+    last = '<group name="g1500"><joint name="j0"/></group>'
+    srdf = write(tmp_path, "r.srdf", f"<robot>{''.join([*groups, last])}</robot>")
+    found = read_robot(RobotFiles(tmp_path / "r.urdf", srdf, group="g0"))
+    assert names(found) == ["j0"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('multiplier="2"', 'multiplier="1_0"', "expected a finite number"),
+        ('offset="0.1"', 'offset="\u0661"', "expected a finite number"),
+        ('radius="0.1"', 'radius="1_0"', "expected above 0"),
+    ],
+)
+def test_numbers_are_those_that_every_program_reads(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    with pytest.raises(InvalidFile, match=said):
+        read_robot(RobotFiles(write(tmp_path, "u.urdf", URDF.replace(old, new))))
+
+
 def test_limits_that_are_not_stated_are_noted(tmp_path: Path, urdf: Path) -> None:
     limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
     free = write(tmp_path, "free.urdf", URDF.replace(limit, "", 1))

@@ -103,6 +103,8 @@ def test_scene_text_is_read_in_both_forms(tmp_path: Path) -> None:
             "line 4: is the shape 'cone', expected one of sphere",
         ),
         ("0.2 0.4", "0.2 x", "line 5: is 'x', expected a number"),
+        ("0.2 0.4", "0.2 1_0", "line 5: is '1_0', expected a number"),
+        ("\n1\nbox", f"\n{'1' * 5000}\nbox", "expected a number of shapes"),
         ("\n.\n", "\n", "the file ends"),
         ("\n.\n", "\n.\n* can\n", "is '*', expected nothing behind '.'"),
         ("* can", "can", "is 'can', expected"),
@@ -224,6 +226,14 @@ def test_what_a_world_includes_is_in_the_hash(tmp_path: Path) -> None:
             assert part in cell.source.files
         found.append([cell.source.sha256 for cell in cells if cell.source])
     assert not set(found[0]) & set(found[1])
+
+
+def test_a_world_that_includes_too_deep_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    for k in range(1200):
+        write(tmp_path, f"w{k}.xml", f"<mujoco><include file='w{k + 1}.xml'/></mujoco>")
+    with pytest.raises(InvalidFile, match=r"w101\.xml: is included by 101 files"):
+        read_scene(tmp_path / "w0.xml", 1.0)
 
 
 def test_a_world_of_hundreds_of_millions_is_refused_at_once(tmp_path: Path) -> None:

@@ -98,6 +98,7 @@ def test_topics_are_chosen(tmp_path: Path, robot: Robot) -> None:
     for topic, expected in (
         ("/other", "has no trajectory under topic '/other'; topics: /joint_trajectory"),
         ("/joint_trajectory#1", "has messages 0 to 0, not '1'"),
+        (f"/joint_trajectory#{'1' * 5000}", "has messages 0 to 0, not '1"),
     ):
         with pytest.raises(InvalidFile, match=expected):
             read_bag(file, topic)

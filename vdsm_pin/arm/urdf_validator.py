@@ -13,6 +13,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.text import plain_number
 
 JOINT_KINDS: Final = ("fixed", "revolute", "prismatic", "continuous")
 """Joint types of an arm."""
@@ -41,13 +42,16 @@ ONCE: Final = (
 """Elements of which readers take the first and pass over others."""
 
 
-def validate_urdf(text: str, *, geometry_only: bool = False) -> None:
+def validate_urdf(text: str, *, geometry_only: bool = False) -> ET.Element:
     """Refuse a URDF document with any defect that a reader might let pass.
 
     Args:
         text: The document.
         geometry_only: Whether masses do not matter, and meshes, capsules, planar and
             floating joints and joints without limits are taken.
+
+    Returns:
+        Its root element.
 
     Raises:
         InvalidInput: If the text is not XML; a name is missing or used twice; a joint
@@ -66,6 +70,7 @@ def validate_urdf(text: str, *, geometry_only: bool = False) -> None:
     for problem in _problems(robot, geometry_only):
         message = f"URDF: {problem}"
         raise InvalidInput(message)
+    return robot
 
 
 def _problems(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
@@ -104,13 +109,16 @@ def _tree_problems(robot: ET.Element) -> Iterator[str]:
     roots = sorted(links - parent_of.keys())
     if len(roots) != 1:
         yield f"expected one root link, found {len(roots)}: {', '.join(roots) or '-'}"
-    for link in sorted(links):
-        seen = {link}
-        while (link := parent_of.get(link, "")) != "":
+    rooted = set[str]()
+    for first in sorted(links):
+        link, seen = first, set[str]()
+        while link and link not in rooted:
             if link in seen:
                 yield f"link {link!r} is its own ancestor: a loop"
                 break
             seen.add(link)
+            link = parent_of.get(link, "")
+        rooted |= seen
 
 
 def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
@@ -139,7 +147,7 @@ def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[s
     given = {} if limit is None else limit.attrib
     if kind in ("revolute", "prismatic"):
         defaults = {"lower": "0", "upper": "0", **given} if optional else given
-        bounds = [_number(defaults.get(name, "")) for name in ("lower", "upper")]
+        bounds = [plain_number(defaults.get(name, "")) for name in ("lower", "upper")]
         if not np.isfinite(bounds).all():
             yield f"{where}: limit needs numbers lower and upper"
         elif not bounds[0] <= bounds[1]:
@@ -148,7 +156,7 @@ def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[s
         return
     for name in ("effort", "velocity", *(["acceleration"] if optional else [])):
         text = given.get(name, "0" if optional else "")
-        if not _number(text) >= 0.0:
+        if not plain_number(text) >= 0.0:
             yield f"{where}: limit {name} is {text!r}, expected 0 or more"
 
 
@@ -234,31 +242,10 @@ def _attribute(element: ET.Element, child: str, name: str) -> str:
     return "" if found is None else found.get(name, "")
 
 
-def _number(text: str) -> float:
-    """A finite number; NaN where it is none."""
-    try:
-        value = float(text) if _plain(text) else np.nan
-    except ValueError:
-        return np.nan
-    return value if np.isfinite(value) else np.nan
-
-
-def _plain(text: str) -> bool:
-    """Whether numbers are written as everybody reads them, unlike 1_0 or ١."""
-    return text.isascii() and "_" not in text
-
-
 def _numbers(
     element: ET.Element, child: str, name: str, count: int
 ) -> FloatArray | None:
     """The finite numbers in a child's attribute; None where they are not `count`."""
-    words = _attribute(element, child, name)
-    try:
-        values = np.array(words.split(), dtype=np.float64)
-    except ValueError:
-        return None
-    return (
-        values
-        if _plain(words) and values.size == count and np.isfinite(values).all()
-        else None
-    )
+    words = _attribute(element, child, name).split()
+    values = np.array([plain_number(word) for word in words])
+    return values if len(words) == count and np.isfinite(values).all() else None

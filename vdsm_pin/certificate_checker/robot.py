@@ -32,12 +32,13 @@ from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose,
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.others import OtherFile, Others
 from vdsm_pin.io.source import files_in, sha256_of_file
+from vdsm_pin.io.xml_reader import end
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Moving
 from vdsm_pin.robots.files import CellFile, RobotFiles, files_of_robot, find_mesh
 from vdsm_pin.robots.joint_limits import Limits, narrowed, read_limits, stated_limits
 from vdsm_pin.robots.model import RobotJoint
-from vdsm_pin.robots.srdf import Srdf, end
+from vdsm_pin.robots.srdf import Srdf
 from vdsm_pin.robots.trajectory_files import read_motion
 from vdsm_pin.robots.xacro import urdf_text
 
@@ -90,8 +91,7 @@ class Model:
     def __init__(self, files: RobotFiles, pose: Any) -> None:
         self.files, self.lock, self.moved = files, files.lock, list[RobotJoint]()
         text, included = urdf_text(files.urdf, files.package_dirs)
-        validate_urdf(text, geometry_only=True)
-        self.document = document = ET.fromstring(text)
+        self.document = document = validate_urdf(text, geometry_only=True)
         meshes = map(self._mesh, document.findall("link/collision/geometry/mesh"))
         self.more = (*included, *dict.fromkeys(meshes))
         self.srdf = srdf = Srdf(files.srdf, document) if files.srdf else None

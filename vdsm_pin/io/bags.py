@@ -116,7 +116,7 @@ def _chosen(messages: list[Any], kind: str, topic: str, number: str) -> Any:
     if not (count := len(messages)):
         message = f"topic {topic} has no message"
         raise InvalidInput(message)
-    if number and not (number.isdecimal() and int(number) < count):
+    if number and number not in map(str, range(count)):
         message = f"topic {topic} has messages 0 to {count - 1}, not {number!r}"
         raise InvalidInput(message)
     if count != 1 and not number:

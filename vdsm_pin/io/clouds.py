@@ -21,6 +21,7 @@ from vdsm_pin.io.source import Digest, opened
 MAX_BYTES: Final = 1 << 30
 MAX_POINTS: Final = 5_000_000
 
+_NPY: Final = b"\x93NUMPY"
 _REMARK: Final = ("#", "//")
 _DECIMAL_COMMA: Final = re.compile(rb"\d[ \t;]+[-+.\d]")
 """Numbers apart by other signs: commas in the same file are then decimal ones."""
@@ -82,11 +83,15 @@ def read_cloud(path: Path, digest: Digest) -> RawCloud:
 def _npy(stream: MeshStream) -> FloatArray:
     """Points, shape (n, 3), or the cells of a grid, 0 or 1 each, shape (a, b, c)."""
     data = io.BytesIO(stream.content.read())
+    if not data.getvalue().startswith(_NPY):  # load reads other files too
+        raise stream.invalid(problem="is no array of numbers: it is no NPY file")
     try:
-        array = np.load(data, allow_pickle=False)
-    except (ValueError, EOFError, OSError, SyntaxError, MemoryError) as error:
-        problem = f"is no array of numbers: {str(error)[:120].splitlines()[0]}"
-        raise stream.invalid(problem) from None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # headers that Python 2 wrote
+            array = np.load(data, allow_pickle=False)
+    except Exception as error:  # noqa: BLE001 (of a damaged header, whatever it meets)
+        said = " ".join(str(error).split())[:120] or type(error).__name__
+        raise stream.invalid(problem=f"is no array of numbers: {said}") from None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
         raise stream.invalid(problem="is no array of numbers")
     stream.check_end(data.read(), f"an array of shape {array.shape}")

@@ -13,6 +13,9 @@ from vdsm_pin.io.meshes.raw import MAX_MESH_LINE, MeshStream, doubles
 _KINDS: Final = {"F": "f", "I": "i", "U": "u"}
 _SIZES: Final = (1, 2, 4, 8)
 _MOST_LINES: Final = 100
+_RECORD: Final = 1 << 20
+"""Most bytes of one point."""
+
 _FRAME: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """The VIEWPOINT of points that are as they stand: no shift, no turn (w x y z)."""
 
@@ -82,6 +85,8 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
         and all(len(words) == 1 for total in totals for words in total)
         and all(word.isdecimal() and len(word) < 12 for word in numbers)
         and {int(size) for size in sizes} <= set(_SIZES)
+        and 0 < min(map(int, counts), default=0)
+        and sum(int(c) * int(s) for c, s in zip(counts, sizes, strict=True)) <= _RECORD
         and set(kinds) <= set(_KINDS)
         and all(
             (kind, int(size)) not in (("F", 1), ("F", 2))
@@ -91,7 +96,7 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
     )
     if not good or any(names.count(axis) != 1 for axis in "xyz"):
         problem = "has a header that is no PCD's: expected FIELDS with x y z, SIZE, "
-        problem += "TYPE, POINTS, DATA ascii, binary or binary_compressed"
+        problem += "TYPE, COUNT from 1, POINTS, DATA ascii, binary or binary_compressed"
         raise stream.invalid(problem)
     points, *others = (math.prod(int(w[0]) for w in total) for total in totals)
     if others and others[0] != points:

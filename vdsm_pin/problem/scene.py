@@ -136,7 +136,9 @@ class Scene:
         """Refuse duplicate names, and what distances are not proved for."""
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         for obstacle in self.obstacles:
-            if not (reach := reach_of(obstacle)) <= TOLERANCES.scene_extent:
+            with np.errstate(over="ignore"):  # too far, as is said
+                reach = reach_of(obstacle)
+            if not reach <= TOLERANCES.scene_extent:
                 message = (
                     f"obstacle {obstacle.name!r} reaches {reach:.6g} m from the base, "
                     f"expected at most {TOLERANCES.scene_extent:g} m"

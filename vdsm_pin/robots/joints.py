@@ -5,7 +5,7 @@ A planar joint becomes three, NAME/x, NAME/y and NAME/theta; a floating one six,
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -14,11 +14,12 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.xml_reader import end, origin_of
 from vdsm_pin.proof.tree import IDENTITY, Joint, Kind, X, Y, Z
 from vdsm_pin.robots.joint_limits import Limits, narrowed, stated_limits
-from vdsm_pin.robots.link_solids import origin_of
 from vdsm_pin.robots.model import RobotJoint
-from vdsm_pin.robots.srdf import Base, end
+from vdsm_pin.robots.srdf import Base
+from vdsm_pin.text import plain_number
 
 _Axis = FloatArray | tuple[float, float, float]
 
@@ -117,14 +118,14 @@ class JointReader:
         self.frames[root] = 1
         if base is not None:
             self.frames[root] = self._hang(1, base.name, _SEVERAL[base.kind], IDENTITY)
-        waiting = list(elements)
-        while waiting:  # a tree, as was checked: each turn takes one at least
-            for joint in [j for j in waiting if end(j, "parent") in self.frames]:
-                parent = self.frames[end(joint, "parent")]
-                name, parts = joint.get("name", ""), _parts(joint)
-                frame = self._hang(parent, name, parts, origin_of(joint))
-                self.frames[end(joint, "child")] = frame
-                waiting.remove(joint)
+        ends = {
+            which: [end(j, which) for j in elements] for which in ("parent", "child")
+        }
+        for joint in _after(elements, ends["parent"], ends["child"], [root]):
+            parent = self.frames[end(joint, "parent")]
+            name, parts = joint.get("name", ""), _parts(joint)
+            frame = self._hang(parent, name, parts, origin_of(joint))
+            self.frames[end(joint, "child")] = frame
 
     def _hang(
         self, parent: int, name: str, parts: Sequence[_Part], placement: FloatArray
@@ -178,18 +179,17 @@ class JointReader:
             else:
                 given = self.moving.limits.get(name, Limits())
                 self._own_values(name, parts, stated_limits(joint, given))
-        while waiting:
-            known = [j for j in waiting if _leader(j) in self._values]
-            if not known:
-                name, leader = waiting[0].get("name", ""), _leader(waiting[0])
+        leaders = [_leader(joint) for joint in waiting]
+        names = [joint.get("name", "") for joint in waiting]
+        for joint in _after(waiting, leaders, names, [*self._values]):
+            self._keep(joint.get("name", ""), self._following(joint))
+        for name, leader in zip(names, leaders, strict=True):
+            if name not in self._values:
                 problem = (
                     f"joint {name!r} mimics {leader!r}, which is no joint of one value "
                     "or mimics it in turn"
                 )
                 raise self.invalid(problem)
-            for joint in known:
-                self._keep(joint.get("name", ""), self._following(joint))
-                waiting.remove(joint)
 
     def _following(self, joint: ET.Element) -> _Value:
         mimic = joint.find("mimic")
@@ -245,14 +245,34 @@ class JointReader:
 
     def _number(self, element: ET.Element, name: str, default: float) -> float:
         word = element.get(name)
-        try:
-            value = default if word is None else float(word)
-        except ValueError:
-            value = np.nan
+        value = default if word is None else plain_number(word)
         if not np.isfinite(value):
             problem = f"<{element.tag}> has {name}={word!r}, expected a finite number"
             raise self.invalid(problem)
         return value
+
+
+def _after(
+    elements: Sequence[ET.Element],
+    above: Sequence[str],
+    names: Sequence[str],
+    first: Sequence[str],
+) -> Iterator[ET.Element]:
+    """Elements behind those that they hang on, level by level; others are left out.
+
+    Args:
+        elements: In the order of the file, which they keep within a level.
+        above: The name of what each hangs on.
+        names: Their own.
+        first: Names of what they hang on in the end.
+    """
+    below: dict[str, list[int]] = {}
+    for k, name in enumerate(above):
+        below.setdefault(name, []).append(k)
+    level = list(first)
+    while found := sorted(k for name in level for k in below.pop(name, ())):
+        yield from (elements[k] for k in found)
+        level = [names[k] for k in found]
 
 
 def _parts(joint: ET.Element) -> tuple[_Part, ...]:

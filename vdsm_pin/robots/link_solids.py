@@ -14,13 +14,14 @@ from vdsm_pin.geometry.arrays import (
     FloatArray,
     IntArray,
     distinct_rows,
-    rotation_from_rpy,
 )
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.io.xml_reader import origin_of
 from vdsm_pin.robots.files import HULLS, MeshCover, find_mesh
 from vdsm_pin.robots.hulls import covering_hull, covering_primitive
+from vdsm_pin.text import plain_number
 from vdsm_pin.units import MM_PER_M
 
 LARGEST_LINK: Final = 20.0
@@ -121,10 +122,7 @@ class LinkReader:
         """The corners of a link's mesh, scaled, shape (n, 3, 3); [m]."""
         name = shape.get("filename", "")
         mesh = read_mesh(self._found(link, name))
-        try:
-            scale = np.array([float(w) for w in shape.get("scale", "1 1 1").split()])
-        except ValueError:
-            scale = np.zeros(0)
+        scale = np.array([plain_number(w) for w in shape.get("scale", "1 1 1").split()])
         if scale.shape != (3,) or not (np.isfinite(scale) & (scale != 0.0)).all():
             word = shape.get("scale")
             problem = f"scale is {word!r}, expected 3 numbers that are not 0"
@@ -155,13 +153,3 @@ class LinkReader:
 
     def _invalid(self, link: str, problem: str) -> InvalidFile:
         return InvalidFile(file=self.path, problem=f"link {link!r}: {problem}")
-
-
-def origin_of(element: ET.Element) -> FloatArray:
-    """T_parent_element, shape (4, 4), of numbers that were checked."""
-    placement, origin = np.eye(4), element.find("origin")
-    if origin is not None:
-        rpy = np.array([float(word) for word in origin.get("rpy", "0 0 0").split()])
-        placement[:3, :3] = rotation_from_rpy(rpy)
-        placement[:3, 3] = [float(word) for word in origin.get("xyz", "0 0 0").split()]
-    return placement

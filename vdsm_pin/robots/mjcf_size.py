@@ -16,6 +16,9 @@ MAX_BYTES: Final = 64 << 20
 MOST: Final = 50_000
 """Elements of a world, each as often as it is repeated."""
 
+DEEPEST: Final = 100
+"""Most files that include one another in turn."""
+
 REPEATED: Final = ("replicate", "composite", "flexcomp")
 """Elements whose `count` says how often what is in them stands there."""
 
@@ -30,7 +33,7 @@ def check_size(file: Path) -> tuple[Path, ...]:
         InvalidFile: If it has more, or is no XML.
     """
     seen: dict[Path, None] = {}
-    count = _elements(file, file.parent, seen)
+    count = _elements(file, file.parent, seen, 0)
     if not count <= MOST:
         problem = (
             f"has {count:.6g} elements, each counted as often as `replicate` and the "
@@ -40,21 +43,28 @@ def check_size(file: Path) -> tuple[Path, ...]:
     return tuple(seen)[1:]
 
 
-def _elements(file: Path, folder: Path, seen: dict[Path, None]) -> float:
+def _elements(file: Path, folder: Path, seen: dict[Path, None], depth: int) -> float:
     """Elements of a file and of all that it includes or attaches.
 
     Args:
         file: The file.
         folder: Of the world, from where files are named.
         seen: Files that were counted; mujoco includes none twice.
+        depth: How many files include it, one within another.
+
+    Raises:
+        InvalidFile: If that are more than are read.
     """
     if file in seen or not file.is_file():  # which mujoco tells
         return 0.0
+    if depth > DEEPEST:
+        problem = f"is included by {depth} files, one within another"
+        raise InvalidFile(file=file, problem=f"{problem}, expected {DEEPEST} at most")
     seen[file] = None
     root = read_xml(read_bytes(file, limit=MAX_BYTES), file)
 
     def named(element: ET.Element) -> float:
-        return _elements(folder / element.get("file", ""), folder, seen)
+        return _elements(folder / element.get("file", ""), folder, seen, depth + 1)
 
     models = sum(map(named, root.iter("model")))
     total, left = 0.0, [(root, 1.0)]

@@ -1,11 +1,13 @@
 """The `.scene` text files of MoveIt, as the PlanningScene that they hold."""
 
 from collections.abc import Iterator
+from math import isnan
 from pathlib import Path
 from typing import Any, Final
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.text import plain_number
 
 MOST: Final = 100_000
 """Most shapes of one object."""
@@ -44,18 +46,17 @@ class _Words:
         found = []
         for _ in range(count):
             word = self.next("a number")
-            try:
-                found.append(float(word))
-            except ValueError:
-                problem = f"is {word!r}, expected a number"
-                raise self.invalid(problem) from None
+            found.append(plain_number(word))
+            if isnan(found[-1]):
+                problem = f"is {word[:40]!r}, expected a number"
+                raise self.invalid(problem)
         return found
 
     def count(self, what: str) -> int:
         """The next whole number."""
         word = self.next(f"a number of {what}")
-        if not word.isdecimal() or int(word) > MOST:
-            problem = f"is {word!r}, expected a number of {what}"
+        if not word.isdecimal() or len(word) > len(str(MOST)) or int(word) > MOST:
+            problem = f"is {word[:40]!r}, expected a number of {what}"
             raise self.invalid(problem)
         return int(word)
 

@@ -3,13 +3,14 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Final, Literal, TypeAlias, cast
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.tables import listed
-from vdsm_pin.io.xml_reader import read_xml
+from vdsm_pin.io.xml_reader import end, read_xml
 
 MAX_BYTES: Final = 16 << 20
 
@@ -102,32 +103,39 @@ class Srdf:
         """Names of the joints of a group.
 
         Raises:
-            InvalidFile: If it or what it is made of is not there.
+            InvalidFile: If it or what it is made of is not there, or a part of itself.
         """
-        return frozenset(self._members(name, ()))
-
-    def _members(self, name: str, within: tuple[str, ...]) -> set[str]:
         groups = {g.get("name", ""): g for g in self._root.findall("group")}
-        if name not in groups:
-            known = ", ".join(groups) or "none"
-            problem = f"has no group {name!r}; known: {known}"
-            raise self._invalid(problem)
-        if name in within:
-            problem = f"group {name!r} is a part of itself"
-            raise self._invalid(problem)
-        where, found = f"group {name!r}", set[str]()
-        for part in groups[name]:
+        parts, left = dict[str, list[str]](), [name]
+        while left:
+            if (one := left.pop()) in parts:
+                continue
+            if one not in groups:
+                known = ", ".join(groups) or "none"
+                problem = f"has no group {one!r}; known: {known}"
+                raise self._invalid(problem)
+            parts[one] = [part.get("name", "") for part in groups[one].findall("group")]
+            left += parts[one]
+        try:
+            TopologicalSorter(parts).prepare()
+        except CycleError as error:
+            problem = f"group {error.args[1][0]!r} is a part of itself"
+            raise self._invalid(problem) from None
+        return frozenset(j for one in parts for j in self._joints_in(groups[one]))
+
+    def _joints_in(self, group: ET.Element) -> Iterator[str]:
+        """Those that a group names, without those of groups within."""
+        where = f"group {group.get('name', '')!r}"
+        for part in group:
             match part.tag:
                 case "joint":
-                    found.add(self._joint(part.get("name", ""), where))
+                    yield self._joint(part.get("name", ""), where)
                 case "link":
                     link = self._link(part.get("name", ""), where)
-                    found |= {self._joint_of[link]} if link in self._joint_of else set()
+                    if link in self._joint_of:
+                        yield self._joint_of[link]
                 case "chain":
-                    found |= self._chain(part, where)
-                case "group":
-                    found |= self._members(part.get("name", ""), (*within, name))
-        return found
+                    yield from self._chain(part, where)
 
     def _joint(self, name: str, where: str) -> str:
         virtual = {v.get("name", "") for v in self._root.findall("virtual_joint")}
@@ -155,9 +163,3 @@ class Srdf:
             found.add(joint)
             link = end(self._joints[joint], "parent")
         return found
-
-
-def end(joint: ET.Element, which: str) -> str:
-    """The `parent` or `child` link of a joint of a URDF."""
-    element = joint.find(which)
-    return "" if element is None else element.get("link", "")

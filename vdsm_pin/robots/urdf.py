@@ -30,8 +30,7 @@ def read_robot(files: RobotFiles) -> Robot:
     urdf, group, solids = files.urdf, files.group, files.solids
     text, included = urdf_text(urdf, files.package_dirs)
     with naming(urdf):
-        validate_urdf(text, geometry_only=True)
-    document = ET.fromstring(text)
+        document = validate_urdf(text, geometry_only=True)
     more = Srdf(files.srdf, document) if files.srdf is not None else None
     if group is not None and more is None:
         message = f"group {group!r} needs a SRDF, which lists its joints"

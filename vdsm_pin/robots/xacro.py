@@ -1,7 +1,6 @@
 """The text of a URDF; a xacro file is expanded by xacrodoc (extra `xacro`)."""
 
 import json
-import re
 import subprocess
 import sys
 import tempfile
@@ -11,6 +10,7 @@ from typing import Final
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.source import check_is_file, read_text
+from vdsm_pin.io.xml_reader import declared
 
 MAX_BYTES: Final = 16 << 20
 SCRIPT: Final = """
@@ -23,9 +23,6 @@ finally:
     print(json.dumps(xacro.all_includes))
 """
 """Expands a file, and prints in its last line which other files it has read."""
-
-PREFIX: Final = re.compile(r"[<\s/]([A-Za-z_][\w.-]*):[A-Za-z_]")
-"""Before the name of an element or attribute."""
 
 SLOWEST: Final = 60.0
 """How long an expansion may take; [s]."""
@@ -44,24 +41,13 @@ def urdf_text(
         InvalidFile: If it cannot be read or expanded, or xacrodoc is not installed.
     """
     if path.suffix.lower() != ".xacro":
-        return _declared(read_text(path, limit=MAX_BYTES)), ()
+        return declared(read_text(path, limit=MAX_BYTES)), ()
     check_is_file(path)
     if find_spec("xacrodoc") is None:
         problem = "xacro needs xacrodoc: pip install 'vdsm-pin[xacro]'"
         raise InvalidFile(file=path, problem=problem)
     with tempfile.TemporaryDirectory() as folder:
         return _expanded(path, package_dirs, Path(folder) / "robot.urdf")
-
-
-def _declared(text: str) -> str:
-    """The same XML, its root declaring the prefixes that nothing else does.
-
-    ROS reads `drake:acceleration="2.5"` without; an XML parser does not.
-    """
-    prefixes = dict.fromkeys(PREFIX.findall(text))
-    names = [name for name in prefixes if f"xmlns:{name}" not in text]
-    more = "".join(f' xmlns:{name}="{name}"' for name in names if name != "xmlns")
-    return re.sub(r"<robot(?=[\s>])", f"<robot{more}", text, count=1)
 
 
 def _expanded(
