@@ -123,7 +123,9 @@ def zone(problem: PlanningProblem, axis: str, growth: float) -> Zone | None:
     section = section_along(problem.scene.obstacles[0], axis)
     if section is None:
         return None
-    return Zone(shapely.MultiPoint(section.points).convex_hull, section.radius + growth)
+    return Zone(
+        shapely.MultiPoint(section.corners).convex_hull, section.radius + growth
+    )
 
 
 def danger_zone(problem: PlanningProblem, axis: str) -> Zone | None:
@@ -204,7 +206,7 @@ def hidden(view: View, problem: PlanningProblem, points: FloatArray) -> BoolArra
             section = section_along(obstacle, axis)
             if section is None:
                 continue
-            core = shapely.MultiPoint(section.points).convex_hull
+            core = shapely.MultiPoint(section.corners).convex_hull
             body = core.buffer(section.radius) if section.radius else core
             rays = np.stack([points, far], axis=1)[:, :, list(columns)]
             covered |= shapely.intersects(body, shapely.linestrings(rays))

@@ -6,7 +6,6 @@ import shapely
 
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.region_kernels import leave_along, reach_along_circle
-from vdsm_pin.planner.paper.sections import Section
 
 SHAPES = {
     "disc": [[0.7, 0.6]],
@@ -110,11 +109,11 @@ def test_the_shadow_is_where_the_straight_arm_meets_the_region(name: str) -> Non
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_rounded_sections_hold_the_section_and_each_other(name: str) -> None:
-    section = Section(name, np.array(SHAPES[name]), 0.05)
+    section = DangerRegion(name, np.array(SHAPES[name]), 0.05)
     smaller = core(name).buffer(0.05)
     for rounding in (0.25, 0.5, 1.0):
         rounded = section.rounded(rounding)
-        hull = shapely.MultiPoint(rounded.points).convex_hull
+        hull = shapely.MultiPoint(rounded.corners).convex_hull
         larger = hull.buffer(rounded.radius, quad_segs=256)
         assert larger.buffer(1e-5).covers(smaller)
         smaller = larger

@@ -11,7 +11,7 @@ from vdsm_pin.geometry.solids import Cylinder, Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.approach import first_station
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.sections import Section, merged
+from vdsm_pin.planner.paper.sections import merged
 from vdsm_pin.problem.desired_path import Approach
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -87,17 +87,18 @@ def test_the_merged_section_holds_all() -> None:
     rng = np.random.default_rng(2)
     for _ in range(50):
         parts = [
-            Section(f"{k}", rng.normal(size=(1, 2)), rng.uniform(0.0, 0.3))
+            DangerRegion(f"{k}", rng.normal(size=(1, 2)), rng.uniform(0.0, 0.3))
             for k in range(int(rng.integers(2, 5)))
         ]
         whole = merged(parts)
-        shape = shapely.MultiPoint(whole.points).convex_hull.buffer(whole.radius + 1e-9)
+        shape = shapely.MultiPoint(whole.corners).convex_hull.buffer(
+            whole.radius + 1e-9
+        )
         for part in parts:
-            disc = shapely.Point(part.points[0]).buffer(part.radius)
+            disc = shapely.Point(part.corners[0]).buffer(part.radius)
             assert shape.buffer(1e-3).contains(disc)
         assert whole.name == " and ".join(part.name for part in parts)
-        region = DangerRegion(whole.name, whole.points, whole.radius)
-        assert region.core_distance(np.zeros((1, 2, 2))).shape == (1,)
+        assert whole.core_distance(np.zeros((1, 2, 2))).shape == (1,)
     assert merged(parts[:1]) is parts[0]
 
 

@@ -30,7 +30,6 @@ from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.sections import (
     VIEWS,
-    Section,
     grown_by,
     hull_corners,
     planned_gap,
@@ -211,7 +210,7 @@ class AcrossRail:
 
 
 def across_rail(
-    problem: PlanningProblem, section: Section, axis: str, margins: FloatArray
+    problem: PlanningProblem, section: DangerRegion, axis: str, margins: FloatArray
 ) -> Iterator[AcrossRail]:
     """Choices for one obstacle prismatic along Y or Z, the least bent first.
 
@@ -229,7 +228,7 @@ def across_rail(
     joints = range(2, manipulator.n_links + 1)
     bends = [*((joint,) for joint in joints), *pairwise(joints)]
     # The side nearer to the rail first: from there the straight arm comes.
-    first = -1 if section.centre[1] > 0.0 else 1
+    first = -1 if section.middle[1] > 0.0 else 1
     for side in (first, -first):
         region = _with_lee(section, growth, side, problem)
         choices = [
@@ -239,10 +238,10 @@ def across_rail(
 
 
 def _with_lee(
-    section: Section, growth: float, side: int, problem: PlanningProblem
+    section: DangerRegion, growth: float, side: int, problem: PlanningProblem
 ) -> DangerRegion:
     """The section drawn out to beyond the arm's reach on the side not to be passed."""
     far = 4.0 * problem.manipulator.total_length
-    drawn_out = section.points - np.array([0.0, side * far])
-    corners = hull_corners(np.vstack([section.points, drawn_out]))
-    return DangerRegion(section.name, corners, section.radius + growth)
+    drawn_out = section.corners - np.array([0.0, side * far])
+    corners = hull_corners(np.vstack([section.corners, drawn_out]))
+    return replace(section, corners=corners).grown(growth)

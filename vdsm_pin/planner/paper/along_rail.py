@@ -6,7 +6,7 @@ Where links cannot follow a sharp corner of the section, blunter regions are tri
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -19,7 +19,7 @@ from vdsm_pin.planner.paper.detours import detour_route, path_rows
 from vdsm_pin.planner.paper.joint_paths import SideRule, slide_joints
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps
-from vdsm_pin.planner.paper.sections import Section, grown_by, planned_gap
+from vdsm_pin.planner.paper.sections import grown_by, planned_gap
 from vdsm_pin.planner.paper.shadow import visits
 from vdsm_pin.planner.paper.side_rules import anchors, bends, choose_rule
 from vdsm_pin.planner.paper.tip_path import Route
@@ -79,7 +79,7 @@ class AlongRail:
 
 
 def along_rail(
-    problem: PlanningProblem, section: Section, margins: FloatArray
+    problem: PlanningProblem, section: DangerRegion, margins: FloatArray
 ) -> Iterator[AlongRail]:
     """Choices for one obstacle prismatic along X, the paper's own first.
 
@@ -92,7 +92,7 @@ def along_rail(
         PathBlocked: If the rail or the start lies in the danger region.
     """
     growth = grown_by(problem)
-    forbidden = _grown(section, growth)
+    forbidden = section.grown(growth)
     for what, point in (
         ("the rail", np.zeros(2)),
         ("the start", problem.path.start[1:]),
@@ -112,21 +112,16 @@ def along_rail(
 
 
 def _shapes(
-    problem: PlanningProblem, section: Section, growth: float
+    problem: PlanningProblem, section: DangerRegion, growth: float
 ) -> list[DangerRegion]:
     """The danger region with sharper to blunter corners, as far as there is room."""
-    shapes = [_grown(section, growth)]
-    for rounding in ROUNDINGS[1:] if len(section.points) > 1 else ():
-        shape = _grown(section.rounded(rounding), growth)
+    shapes = [section.grown(growth)]
+    for rounding in ROUNDINGS[1:] if len(section.corners) > 1 else ():
+        shape = section.rounded(rounding).grown(growth)
         if not core_gaps(shape.corners, anchors(problem)).min() > shape.radius:
             break
         shapes.append(shape)
     return shapes
-
-
-def _grown(section: Section, growth: float) -> DangerRegion:
-    radius = section.radius + growth
-    return DangerRegion(section.name, section.points, radius, section.centres)
 
 
 def _choice(
@@ -147,8 +142,7 @@ def _choice(
     grown = max(r.radius - shapes[_rank(r, shapes)].radius for r in regions)
     # The tip ends the last link, whose margin it keeps.
     radius = shapes[_rank(bluntest, shapes)].radius + grown + margins[-1]
-    name, centres = forbidden.name, forbidden.centres
-    region = DangerRegion(name, bluntest.corners, radius, centres)
+    region = replace(bluntest, radius=radius)
     return AlongRail(problem, forbidden, region, rules, margins)
 
 

@@ -15,7 +15,8 @@ from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.across_rail import across_rail
 from vdsm_pin.planner.paper.along_rail import along_rail
-from vdsm_pin.planner.paper.sections import Section, merged, section_along
+from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.sections import merged, section_along
 from vdsm_pin.planner.paper.tip_path import Route, straight_route
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -151,7 +152,9 @@ def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoida
         raise refusal
 
 
-def _groups(seen: Mapping[str, list[Section | None]]) -> list[tuple[str, Section]]:
+def _groups(
+    seen: Mapping[str, list[DangerRegion | None]],
+) -> list[tuple[str, DangerRegion]]:
     """Sections to go round with their axes: of one obstacle, of two together, ..
 
     Args:

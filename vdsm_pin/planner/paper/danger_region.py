@@ -1,16 +1,18 @@
 """The danger region: a convex section grown to where joint centres may not go.
 
-It is the hull of the section's corners grown by one radius (body radius, required
-clearance, margin), so its boundary is made of exact arcs and straight sides. A joint
-that would fall inside slides along an auxiliary line onto the boundary (paper, 4.3);
-the tip walks along the boundary (4.2.3).
+It is the hull of the section's corners grown by one radius (that of the section, the
+body's, required clearance, margin), so its boundary is made of exact arcs and straight
+sides. A joint that would fall inside slides along an auxiliary line onto the boundary
+(paper, 4.3); the tip walks along the boundary (4.2.3). An obstacle's section is such a
+region itself, not grown yet.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
+import shapely
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze, frozen, read_only
 from vdsm_pin.planner.paper.region_kernels import (
@@ -28,12 +30,12 @@ ARC_STEP: Final = float(np.deg2rad(0.25))
 
 @dataclass(frozen=True)
 class DangerRegion:
-    """Convex hull of corners, grown by a radius above 0, in a projection plane.
+    """Convex hull of corners, grown by a radius, in a projection plane.
 
     Args:
         name: Name of the obstacle.
         corners: Counterclockwise, shape (n, 2), n >= 1; [m].
-        radius: [m].
+        radius: 0 or more, of what is walked round or covers anything above 0; [m].
         centres: Of the obstacles that it stands for, where there are several, shape
             (k, 2); [m].
     """
@@ -53,6 +55,12 @@ class DangerRegion:
         return frozen(self.corners.mean(axis=0))
 
     @cached_property
+    def middle(self) -> FloatArray:
+        """Centre of the corners' bounding circle, shape (2,); [m]."""
+        circle = shapely.minimum_bounding_circle(shapely.MultiPoint(self.corners))
+        return frozen(np.array(circle.centroid.coords[0]))
+
+    @cached_property
     def sides(self) -> FloatArray:
         """Straight parts of the boundary, shape (n, 2 ends, 2); [m]."""
         return frozen(sides_of(self.corners, self.radius))
@@ -64,7 +72,22 @@ class DangerRegion:
 
     def grown(self, margin: float) -> "DangerRegion":
         """The same region, farther out by a margin; [m]."""
-        return DangerRegion(self.name, self.corners, self.radius + margin)
+        return replace(self, radius=self.radius + margin)
+
+    def rounded(self, rounding: float) -> "DangerRegion":
+        """A larger region with blunter corners.
+
+        The corners shrink towards the middle by that part while the radius grows to
+        make up for it: 0 leaves the region alone, 1 gives its enclosing circle.
+        """
+        if rounding == 0.0 or len(self.corners) == 1:
+            return self
+        offset = self.corners - self.middle
+        reach = float(np.linalg.norm(offset, axis=1).max())
+        if rounding == 1.0:
+            offset = offset[:1] * 0.0
+        corners = self.middle + (1.0 - rounding) * offset
+        return replace(self, corners=corners, radius=self.radius + rounding * reach)
 
     def core_distance(self, chains: FloatArray) -> FloatArray:
         """Distance of polylines to the core, shape (n, m, 2) to (n,); [m]."""

@@ -94,12 +94,8 @@ def _regions(
     regions = []
     for shape in shapes:
         room = float(core_gaps(shape.corners, anchors(problem)).min())
-        radii = [shape.radius + growth * longest for growth in GROWTHS]
-        regions += [
-            DangerRegion(shape.name, shape.corners, radius)
-            for radius in radii
-            if radius < room
-        ]
+        grown = [shape.grown(growth * longest) for growth in GROWTHS]
+        regions += [region for region in grown if region.radius < room]
     return regions
 
 
