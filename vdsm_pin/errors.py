@@ -142,7 +142,7 @@ class Reached:
     """
 
     words: str
-    station: float
+    station: float = 0.0
     link: int = 0
     obstacle: str = ""
     centres: Sequence[Sequence[float]] = ()

@@ -153,7 +153,7 @@ def test_a_narrow_place_is_as_wide_as_it_is_however_thick_the_links() -> None:
     )
     path = DesiredPath(np.array([1.6, 0.0, 0.0]), POINTS, False)
     task = PlanningProblem("walls", arm, Scene(walls), path, 0.005, np.eye(4))
-    told = str(no_way_in(task, np.array([1.0, 0.0, 0.0]), "", 0.0).words)
+    told = str(no_way_in(task, np.array([1.0, 0.0, 0.0])).words)
     # The tip is the first to pass, and thick links may stay outside.
     assert "100.000 mm wide, for a body of 40.000 mm" in told
 

@@ -72,7 +72,7 @@ def straight(task: PlanningProblem, x: float) -> FloatArray:
 def test_the_passage_the_stop_and_the_advice_are_named() -> None:
     task = behind(HALF)
     way = np.column_stack([np.linspace(0.0, 1.4, 141), *np.zeros((2, 141))])
-    words = where_stuck(task, Stuck(way, 51, straight(task, 0.5)), "", 0.0).words
+    words = where_stuck(task, Stuck(way, 51, straight(task, 0.5))).words
     # The tip's point is 80 mm from the frame at any place within the wall.
     assert "160.000 mm wide, for a body of 123.000 mm with 3.500 mm" in words
     assert "narrowest at (580.0, 0.0, 0.0) mm" in words
@@ -88,21 +88,21 @@ def test_what_the_path_itself_lacks_is_named() -> None:
     task = behind(HALF)
     tips = np.array([[0.5, 0.0, 0.01], [0.7, 0.0, 0.01]])
     room = 0.07 - task.manipulator.most_radius
-    told = on_the_path(task, tips, room + 1e-4, "", 0.2)
+    told = on_the_path(task, tips, room + 1e-4)
     assert told is not None
     assert f"leaves the tip itself {room * 1e3:.3f} mm to 'wall3'" in told.words
     assert (told.link, told.obstacle, told.station) == (8, "wall3", 0.2)
-    assert on_the_path(task, tips, room - 1e-4, "", 0.2) is None
-    assert at_reach(task, tips, "", 0.0) is None
+    assert on_the_path(task, tips, room - 1e-4) is None
+    assert at_reach(task, tips) is None
     short = replace(task.manipulator, base_range=(-5.0, 0.7 - 3.126))
-    told = at_reach(replace(task, manipulator=short), tips, "", 0.0)
+    told = at_reach(replace(task, manipulator=short), tips)
     assert told is not None
     assert "longer rail" in told.words
 
 
 def test_an_opening_too_narrow_for_the_tip_is_named() -> None:
     task = behind(0.06)
-    told = no_way_in(task, np.array([0.6, 0.0, 0.0]), "", 0.0)
+    told = no_way_in(task, np.array([0.6, 0.0, 0.0]))
     assert "120.000 mm wide, for a body of 123.000 mm with 3.500 mm" in told.words
     assert told.obstacle.startswith("wall")
 
@@ -157,12 +157,12 @@ def test_limits_that_are_met_are_named_first() -> None:
     way[1, 0] = 1.4
     turn = np.array([np.cos(arm.max_link_angle), np.sin(arm.max_link_angle), 0.0])
     centres[8] = centres[7] + arm.link_lengths[7] * turn
-    words = where_stuck(task, Stuck(way, 2, centres), "", 0.0).words
+    words = where_stuck(task, Stuck(way, 2, centres)).words
     assert "joint 8 is at its own" in words
     assert "all the way in" in words
     short = replace(arm, base_range=(float(centres[0, 0]), 1.0))
     task = replace(task, manipulator=short)
-    words = where_stuck(task, Stuck(way, 2, centres), "", 0.0).words
+    words = where_stuck(task, Stuck(way, 2, centres)).words
     assert "try a longer rail" in words
 
 

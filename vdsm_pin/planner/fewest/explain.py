@@ -1,6 +1,7 @@
 """What the user is told: why there is no plan, and what is proved about a plan."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.explore import Outcome
 from vdsm_pin.planner.fewest.motion import Corners, standing
-from vdsm_pin.planner.fewest.narrow_passage import narrowest_passage
+from vdsm_pin.planner.fewest.narrow_passage import Passage, narrowest_passage
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
 from vdsm_pin.planner.fewest.stuck import (
@@ -192,35 +193,45 @@ def how_far(problem: PlanningProblem, outcome: Outcome, deadline: Deadline) -> R
         f"{problem.in_file(tip)}"
     )
     rows = outcome.rows.tips[(stations >= station) & (stations <= stop)]
-    cause = on_the_path(problem, rows, outcome.judge.required, words, station)
-    if cause is not None:
-        return cause
-    if outcome.stuck is not None:
-        return where_stuck(problem, outcome.stuck, words, station)
-    cause = at_reach(problem, rows, words, station)
-    if cause is not None:
-        return cause
-    passed = narrowest_passage(problem, outcome.judge.clearance, tip, deadline)
-    if passed is not None and too_narrow(problem, passed.place):
-        return no_way_in(problem, passed.place, words, station)
-    advice = "another start or a longer time limit"
+    cause = on_the_path(problem, rows, outcome.judge.required)
+    if cause is None and outcome.stuck is not None:
+        cause = where_stuck(problem, outcome.stuck)
+    cause = cause or at_reach(problem, rows)
+    if cause is None:
+        passed = narrowest_passage(problem, outcome.judge.clearance, tip, deadline)
+        cause = _on_the_way(problem, passed, tip)
+    told = f"{words}; {cause.words}" if cause.words else words
+    return replace(cause, words=told, station=station)
+
+
+def _on_the_way(
+    problem: PlanningProblem, passed: Passage | None, tip: FloatArray
+) -> Reached:
+    """What is in the way to a tip: the passage, the follower, the straight arm.
+
+    Args:
+        problem: Arm and scene.
+        passed: The best way in, None where none is known.
+        tip: Shape (3,); [m].
+    """
+    advice, parts = "another start or a longer time limit", list[str]()
     if passed is not None:
+        if too_narrow(problem, passed.place):
+            return no_way_in(problem, passed.place)
         follower = following(problem, passed.route)
-        words += f"; {passage(problem, passed.place)}; {follower.words}"
+        parts += [passage(problem, passed.place), follower.words]
         advice = f"{follower.advice} or {advice}" if follower.advice else advice
     zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
     centres = standing(problem.manipulator, tip[None], zero)[0]
     if not problem.scene.obstacles or not np.isfinite(centres).all():
-        return Reached(words, station)
+        return Reached("; ".join(parts))
     found = culprit(problem, centres)
     if found.clearance == np.inf:
-        return Reached(words, station)
+        return Reached("; ".join(parts))
     called = named(problem.manipulator, found.link)
-    words += (
-        f"; {called} of the straight arm there has {found.words} to "
-        f"{found.obstacle!r}; try {advice}"
-    )
-    return Reached(words, station, found.link, found.obstacle)
+    words = f"{called} of the straight arm there has {found.words} to"
+    parts += [f"{words} {found.obstacle!r}", f"try {advice}"]
+    return Reached("; ".join(parts), 0.0, found.link, found.obstacle)
 
 
 def notes_of(

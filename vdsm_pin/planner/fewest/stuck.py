@@ -1,4 +1,7 @@
-"""Where a search came to an end, what stopped it, and what might help."""
+"""Where a search came to an end, what stopped it, and what might help.
+
+Who calls says at which station it was: here the words begin with what stopped it.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -54,18 +57,9 @@ class Stuck:
     centres: FloatArray
 
 
-def where_stuck(
-    problem: PlanningProblem, stuck: Stuck, words: str, station: float
-) -> Reached:
-    """The narrowest passage, how far the arm came, what to try.
-
-    Args:
-        problem: Arm and scene.
-        stuck: The insertion that came farthest.
-        words: What is known besides, told first.
-        station: Where along the path the first stretch begins that is not drawn; [m].
-    """
-    parts, link, obstacle = [words], 0, ""
+def where_stuck(problem: PlanningProblem, stuck: Stuck) -> Reached:
+    """The narrowest passage, how far the arm came, what to try."""
+    parts, link, obstacle = list[str](), 0, ""
     narrowest: list[float] = []
     if held_from(problem, TIP_ONLY).scene.obstacles:
         narrow = stuck.route[_opening(problem, stuck)[0]]
@@ -78,8 +72,8 @@ def where_stuck(
     follower = following(problem, stuck.route)
     parts.append(follower.words)
     parts.append(f"try {' or '.join(_advice(problem, stuck, follower.advice))}")
-    centres = stuck.centres.tolist()
-    return Reached("; ".join(parts), station, link, obstacle, centres, narrowest)
+    words, centres = "; ".join(parts), stuck.centres.tolist()
+    return Reached(words, 0.0, link, obstacle, centres, narrowest)
 
 
 def _opening(problem: PlanningProblem, stuck: Stuck) -> tuple[int, float]:
@@ -170,52 +164,37 @@ def too_narrow(problem: PlanningProblem, place: FloatArray) -> bool:
     return 2.0 * nearest(problem, place)[1] < _needed(problem)
 
 
-def no_way_in(
-    problem: PlanningProblem, place: FloatArray, words: str, station: float
-) -> Reached:
+def no_way_in(problem: PlanningProblem, place: FloatArray) -> Reached:
     """No way for the tip was found: where the widest is too narrow, what to try.
 
     Args:
         problem: Arm and scene.
         place: There, shape (3,); [m].
-        words: What is known besides, told first.
-        station: Where along the path the first stretch begins that is not drawn; [m].
     """
     name, _ = nearest(problem, place)
     told = (
-        f"{words}; no way for the tip was found: {passage(problem, place)}; try a "
-        "smaller `required_clearance` or a wider opening"
+        f"no way for the tip was found: {passage(problem, place)}; try a smaller "
+        "`required_clearance` or a wider opening"
     )
-    last = problem.manipulator.n_links
-    return Reached(told, station, last, name, (), place.tolist())
+    return Reached(told, 0.0, problem.manipulator.n_links, name, (), place.tolist())
 
 
-def at_reach(
-    problem: PlanningProblem, tips: FloatArray, words: str, station: float
-) -> Reached | None:
-    """Where a stretch of the path is at the end of the arm's reach; else None.
-
-    Arguments are those of `on_the_path`.
-    """
+def at_reach(problem: PlanningProblem, tips: FloatArray) -> Reached | None:
+    """Where tips of the path, (r, 3), are at the end of the arm's reach; else None."""
     length = problem.manipulator.total_length
     away = rail_distance(problem.manipulator, tips)
     far = int(np.argmax(away))
     if not away[far] > AT_REACH * length:
         return None
-    told = (
-        f"{words}; at {problem.in_file(tips[far])} the path is {in_mm(away[far])} from "
-        f"where the base can be, and the straight arm is {in_mm(length)} long; try a "
-        "longer rail (`base_range`) or another path"
+    return Reached(
+        f"at {problem.in_file(tips[far])} the path is {in_mm(away[far])} from where "
+        f"the base can be, and the straight arm is {in_mm(length)} long; try a longer "
+        "rail (`base_range`) or another path"
     )
-    return Reached(told, station)
 
 
 def on_the_path(
-    problem: PlanningProblem,
-    tips: FloatArray,
-    kept: float,
-    words: str,
-    station: float,
+    problem: PlanningProblem, tips: FloatArray, kept: float
 ) -> Reached | None:
     """What keeps every arm from a stretch of the path; None where nothing is seen to.
 
@@ -223,8 +202,6 @@ def on_the_path(
         problem: Arm and scene.
         tips: Along the stretch, at most a row apart, shape (r, 3); [m].
         kept: Clearance that plans keep; [m].
-        words: What is known besides, told first.
-        station: Where along the path the stretch begins; [m].
     """
     problem = held_from(problem, TIP_ONLY)
     arm, share = problem.manipulator, np.arange(FINER)[:, None, None] / FINER
@@ -238,13 +215,13 @@ def on_the_path(
         return None
     name = problem.scene.obstacles[int(np.argmin(clearances[near]))].name
     told = (
-        f"{words}; at {problem.in_file(places[near])} the path leaves the tip itself "
+        f"at {problem.in_file(places[near])} the path leaves the tip itself "
         f"{in_mm(least[near])} to {name!r}, required are "
         f"{in_mm(problem.required_clearance)}, and the search keeps {in_mm(kept)}; try "
         f"a smaller `required_clearance`, a path farther from {name!r}, or "
         "`blocked: detour` to draw the rest"
     )
-    return Reached(told, station, arm.n_links, name, (), places[near].tolist())
+    return Reached(told, 0.0, arm.n_links, name, (), places[near].tolist())
 
 
 def _stop(problem: PlanningProblem, stuck: Stuck) -> str:
