@@ -10,10 +10,11 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.growth import Layers, Population
+from vdsm_pin.planner.fewest.interval_parts import bow_bounds
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows
 from vdsm_pin.planner.fewest.offset_kernels import mutated_offsets
-from vdsm_pin.planner.fewest.pose_kernels import bends_of, bow_bounds, clearances_along
+from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, build_roadmap
 from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
 from vdsm_pin.planner.fewest.route import path_rows, tip_route

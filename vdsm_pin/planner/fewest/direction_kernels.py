@@ -11,8 +11,8 @@ from math import sqrt
 import numpy as np
 
 from vdsm_pin.compiled import borrowed, compiled
-from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.fewest.pose_kernels import Lines, Places
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.planner.fewest.pose_kernels import Lines
 from vdsm_pin.tolerances import TOLERANCES
 
 ROUNDS = 30
@@ -224,13 +224,18 @@ def lined_up_directions(
 
 @compiled
 def placed_between(
-    lines: Lines, places: Places, lengths: FloatArray, base_range: tuple[float, float]
+    lines: Lines,
+    interval: IntArray,
+    share: FloatArray,
+    lengths: FloatArray,
+    base_range: tuple[float, float],
 ) -> FloatArray:
     """Joint centres at places of intervals given by directions.
 
     Args:
         lines: The intervals.
-        places: The places.
+        interval: Interval of each place, shape (r,).
+        share: Where in its interval, 0 to 1, shape (r,).
         lengths: Of the links, shape (N,); [m].
         base_range: Smallest and largest x0; [m].
 
@@ -239,8 +244,7 @@ def placed_between(
     """
     tips, next_tips = lines.tips, lines.next_tips
     axes, next_axes = borrowed(lines.offsets), borrowed(lines.next_offsets)
-    (interval, share), (low, high) = places, base_range
-    count = lengths.size
+    count, (low, high) = lengths.size, base_range
     centres = np.full((interval.size, count + 1, 3), np.nan)
     for r in range(interval.size):
         a, t = interval[r], share[r]

@@ -13,7 +13,7 @@ import numpy as np
 
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.interval_parts import Parts
+from vdsm_pin.planner.fewest.interval_parts import LONG_TRAVEL, Parts, parts_of_pieces
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, link_limit
@@ -246,7 +246,8 @@ class Judge:
         most = np.full(count, self.limit)
         if bend is not None:
             most = np.minimum(most, bend + tol)
-        knees, length = self._cuts(intervals), self.problem.manipulator.total_length
+        knees = self._cuts(intervals)
+        long_way = LONG_TRAVEL * self.problem.manipulator.total_length
         number, low, high = np.arange(count), np.zeros(count), np.ones(count)
         every = knees[:, 1:]
         c0, r0 = self._states(intervals, number, low, most, ask, knees, every)
@@ -264,7 +265,7 @@ class Judge:
         good &= self._within(intervals, c0, c1, most)
         parts = Parts(number, low, high, c0, c1, r0, r1)
         for _ in range(CUTS):
-            counts = parts.counts(knees, need, self.finest, length)
+            counts = parts_of_pieces(parts, knees, need, self.finest, long_way)
             doubtful = (counts > 0).any(axis=1) & good[parts.interval]
             if not doubtful.any():
                 return good, begin

@@ -23,7 +23,6 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.direction_kernels import placed_between
 from vdsm_pin.planner.fewest.pose_kernels import (
     Lines,
-    Places,
     centres_between,
     knees_between,
 )
@@ -154,10 +153,11 @@ class Intervals:
             rail; [m].
         """
         lines = Lines(self.tips, self.next_tips, self.offsets, self.next_offsets)
-        places, lengths = Places(interval, share), manipulator.link_lengths
+        lengths, ratios = manipulator.link_lengths, manipulator.ratios
         if self.directed:
-            return placed_between(lines, places, lengths, manipulator.base_range)
-        return centres_between(lines, places, manipulator.ratios, lengths)
+            rail = manipulator.base_range
+            return placed_between(lines, interval, share, lengths, rail)
+        return centres_between(lines, interval, share, ratios, lengths)
 
 
 def is_directed(offsets: FloatArray) -> bool:

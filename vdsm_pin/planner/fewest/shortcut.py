@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners
-from vdsm_pin.planner.fewest.pose_kernels import Chain, farthest_apart, on_line
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -44,12 +44,54 @@ def _flattened(judge: Judge, corners: Corners, spans: list[tuple[int, int]]) -> 
         corners.offsets.copy(),
         corners.edges.copy(),
     )
-    unit = corners.unit(judge.problem.manipulator)
-    chain = Chain(corners.tips, corners.offsets, corners.stations)
-    for a, b in spans:
-        on_line(chain, bool(corners.drawn[a]), unit, (a, b), tips, offsets)
-        edges[a:b] = -1
+    ways = _ways(judge, corners)
+    for span in spans:
+        _on_line(span, ways, corners.drawn, tips, offsets)
+        edges[slice(*span)] = -1
     return replace(corners, tips=tips, offsets=offsets, edges=edges)
+
+
+def _ways(judge: Judge, corners: Corners) -> FloatArray:
+    """How far apart corners are: along the path, or as tip and shape move, (n - 1,)."""
+    unit = corners.unit(judge.problem.manipulator)
+    turns = np.abs(np.diff(corners.offsets, axis=0)).max(axis=(1, 2))
+    moved = np.linalg.norm(np.diff(corners.tips, axis=0), axis=1) + unit * turns
+    return np.where(corners.drawn, np.abs(np.diff(corners.stations)), moved)
+
+
+@compiled
+def _on_line(
+    span: tuple[int, int],
+    ways: FloatArray,
+    drawn: BoolArray,
+    tips: FloatArray,
+    offsets: FloatArray,
+) -> None:
+    """Move corners between two corners onto the straight line between them, in place.
+
+    Where the tip draws, each keeps its station and its tip; elsewhere they are spread
+    as far apart as they are now.
+
+    Args:
+        span: The first corner and the last one.
+        ways: How far apart corners are, shape (n - 1,).
+        drawn: Whether the tip draws in between, shape (n - 1,).
+        tips: Shape (n, 3); [m].
+        offsets: Shape (n, N + 1, 2) [m], or directions, shape (n, N, 3) [-].
+    """
+    a, b = span
+    share = np.zeros(b - a + 1)
+    for k in range(a, b):
+        share[k + 1 - a] = share[k - a] + ways[k]
+    if share[-1] > 0.0:
+        share /= share[-1]
+    else:
+        share[:] = np.arange(b - a + 1) / (b - a)
+    for k in range(a + 1, b):
+        t = share[k - a]
+        offsets[k] = (1.0 - t) * offsets[a] + t * offsets[b]
+        if not drawn[a]:
+            tips[k] = (1.0 - t) * tips[a] + t * tips[b]
 
 
 def _spans(corners: Corners, stride: int, phase: int) -> list[tuple[int, int]]:
@@ -96,8 +138,9 @@ def _round(
     spans: list[tuple[int, int]],
 ) -> tuple[Corners, _State]:
     trial = _flattened(judge, corners, spans)
-    change = farthest_apart(corners.tips, corners.offsets, trial.tips, trial.offsets)
-    moved = change > TOLERANCES.joint_centre
+    gap = np.abs(trial.offsets - corners.offsets).max(axis=(1, 2))
+    gap = np.maximum(gap, np.abs(trial.tips - corners.tips).max(axis=1))
+    moved = gap > TOLERANCES.joint_centre
     spans = [(a, b) for a, b in spans if moved[a : b + 1].any()]
     if not spans:
         return corners, state
@@ -146,17 +189,17 @@ def _guards(
 def straightened(judge: Judge, corners: Corners) -> Corners:
     """Ways without the corners that lie on the line between their neighbours."""
     kept = np.ones(len(corners.tips), dtype=np.bool_)
-    tips, offsets = corners.tips.copy(), corners.offsets.copy()
-    unit, a = corners.unit(judge.problem.manipulator), 0
-    chain = Chain(corners.tips, corners.offsets, corners.stations)
+    a, ways = 0, _ways(judge, corners)
     for k in range(1, len(corners.tips) - 1):
         if not (corners.drawn[k - 1] or corners.drawn[k]):
-            on_line(chain, False, unit, (a, k + 1), tips, offsets)
-            span = slice(a + 1, k + 1)
-            gap = farthest_apart(
-                corners.tips[span], corners.offsets[span], tips[span], offsets[span]
+            own, span = slice(a, k + 1), slice(a, k + 2)
+            tips, offsets = corners.tips[span].copy(), corners.offsets[span].copy()
+            _on_line((0, k + 1 - a), ways[own], corners.drawn[own], tips, offsets)
+            gap = max(
+                np.abs(tips - corners.tips[span]).max(),
+                np.abs(offsets - corners.offsets[span]).max(),
             )
-            kept[k] = gap.max() > TOLERANCES.joint_centre
+            kept[k] = gap > TOLERANCES.joint_centre
         a = k if kept[k] else a
     return corners.take(np.flatnonzero(kept))
 
