@@ -27,7 +27,7 @@ from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.impossible.bounds import least_changed
-from vdsm_pin.planner.paper import pipeline, side_rules
+from vdsm_pin.planner.paper import joint_paths, pipeline
 from vdsm_pin.planner.paper.online import OnlineRule
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.refinement import plan_and_verify
@@ -245,7 +245,7 @@ class Counts:
 @contextmanager
 def counted() -> Iterator[Counts]:
     """Count rounds of Steps 2-7 and choices of line and region."""
-    counts, solve, best = Counts(), pipeline.solve, side_rules.best_rule
+    counts, solve, best = Counts(), pipeline.solve, joint_paths.best_rule
 
     def solving(*arguments: Any) -> Any:
         counts.solves += 1
@@ -258,7 +258,7 @@ def counted() -> Iterator[Counts]:
 
     with (
         patch.object(pipeline, "solve", solving),
-        patch.object(side_rules, "best_rule", choosing),
+        patch.object(joint_paths, "best_rule", choosing),
     ):
         yield counts
 

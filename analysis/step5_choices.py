@@ -18,7 +18,7 @@ from vdsm_pin.app.explanation.cross import DIRECTIONS, leave
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.paper import side_rules
+from vdsm_pin.planner.paper import joint_paths
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.refinement import plan_and_verify
@@ -30,7 +30,7 @@ GROWTHS: Final = (0.0, 0.02, 0.04, 0.08)
 [m]."""
 LINES: Final = ("vertical", "horizontal", "oblique, 90°", "oblique, 75°",
                 "oblique, 105°", "oblique, 60°", "oblique, 120°", "circle")  # fmt: skip
-"""Auxiliary lines in the order of `side_rules`; oblique ones by their angle to the ray
+"""Auxiliary lines in the order of `joint_paths`; oblique ones by their angle to the ray
 from P1 through the obstacle."""
 
 
@@ -126,12 +126,12 @@ def literal(runs: Runs, scene: str) -> list[Literal]:
 
 def one_line(runs: Runs, scene: str, number: int) -> OneLine:
     """The plan whose joints may slide along one line only."""
-    problem, lines = runs.problem(scene), side_rules._lines
+    problem, lines = runs.problem(scene), joint_paths._lines
 
     def only(region: DangerRegion, side: int) -> list[FloatArray | None]:
-        return [lines(region, side)[number]] * side_rules.CROSS
+        return [lines(region, side)[number]] * joint_paths.CROSS
 
-    with patch.object(side_rules, "_lines", only):
+    with patch.object(joint_paths, "_lines", only):
         try:
             found = plan_and_verify(problem, "paper")
         except Infeasible:

@@ -8,17 +8,19 @@ import pytest
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.joint_paths import SideRule, links_of, slide_joints
-from vdsm_pin.planner.paper.region_kernels import keeps_out
-from vdsm_pin.planner.paper.side_rules import (
+from vdsm_pin.planner.paper.joint_paths import (
     COARSE,
     CROSS,
     LARGEST_SWING,
+    SideRule,
     _lines,
     _regions,
     choose_rule,
+    links_of,
+    slide_joints,
 )
-from vdsm_pin.planner.paper.sliding_kernels import standing
+from vdsm_pin.planner.paper.region_kernels import keeps_out
+from vdsm_pin.planner.paper.sliding_kernels import Standing, standing
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
 CORES = {
@@ -44,7 +46,7 @@ def score(
         for stride, swing in ((COARSE, np.inf), (1, LARGEST_SWING)):
             planar = slide_joints(arm, tip[::stride].copy(), rule)
             links = links_of(arm, NONE)
-            able = standing(planar, links, forbidden.core, swing)
+            able = standing(planar, Standing(links, forbidden.core, swing))
             count = len(able) if able.all() else int(np.argmin(able))
             gaps = np.diff(planar[:count], axis=1) / arm.link_lengths[:, None]
             along = np.sqrt(1.0 - (gaps**2).sum(axis=2)) @ arm.link_lengths

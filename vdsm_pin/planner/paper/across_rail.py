@@ -11,6 +11,7 @@ it, it would have to withdraw.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
@@ -37,14 +38,8 @@ from vdsm_pin.planner.paper.sections import (
 from vdsm_pin.planner.paper.tip_path import Route, drawn_rows, straight_route
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
-SCAN: Final = 12
-"""Moves of the bend tried before the first clear one is narrowed down."""
-
 TRIAL_ROWS: Final = 48
 """Waypoints on which the bends are compared."""
-
-HALVINGS: Final = 24
-"""Rounds of bisection: 2 m / 12 / 2^24 is 1e-8 m, far below every margin."""
 
 
 @dataclass(frozen=True)
@@ -105,16 +100,12 @@ class AcrossRail:
         return float(distance.min()) - reserve
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
-        """Step 5: the bends move as little as clears the region."""
-        return self.bent(reference, route.tip_path.points[:, 0])
-
-    def bent(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
-        """Projected joints for reference joints and x of the tip, (n, N + 1, 2); [m].
+        """Step 5: the bends move as little as clears the region.
 
         Raises:
-            PathBlocked: If the bends cannot lead the arm round the obstacle.
+            PathBlocked: If they cannot lead the arm round the obstacle.
         """
-        planar = reference.copy()
+        planar, tip_x = reference.copy(), route.tip_path.points[:, 0]
         blocked = np.flatnonzero(~self.clear(reference, tip_x))
         if len(blocked):
             move = self._least_move(reference[blocked], tip_x[blocked])
@@ -125,7 +116,7 @@ class AcrossRail:
         """Smallest move of the bends that clears the region, signed, (n,); [m]."""
         farthest = self._farthest(reference)
         bends = self._arms(reference, tip_x)
-        moves = least_moves(self._passing, bends, farthest, SCAN, HALVINGS)
+        moves = least_moves(self._passing, bends, farthest)
         if np.isnan(moves).any():
             row = int(np.argmax(np.isnan(moves)))
             tip = np.array([tip_x[row], *reference[row, -1]])
@@ -165,26 +156,18 @@ class AcrossRail:
         knots = np.ascontiguousarray(planar[:, self._ends[1:-1]])
         return Bends(knots, planar[:, -1], tip_x)
 
-    @property
+    @cached_property
     def _passing(self) -> Passing:
-        return Passing(self.region.corners, self._radii, self._pieces, self.axis)
+        margins = [self.margins[a:b].max() for a, b in pairwise(self._ends)]
+        radii = self.region.radius + np.array(margins)
+        lengths = np.diff(self.problem.manipulator.stations[self._ends])
+        return Passing(self.region.corners, radii, lengths, self.axis)
 
-    @property
+    @cached_property
     def _ends(self) -> list[int]:
         """Rows of the joints between which the arm is straight."""
         bends = (bend - 1 for bend in self.bends)
         return [0, *bends, self.problem.manipulator.n_links]
-
-    @property
-    def _pieces(self) -> FloatArray:
-        """Lengths of the straight pieces, shape (k,); [m]."""
-        return np.diff(self.problem.manipulator.stations[self._ends])
-
-    @property
-    def _radii(self) -> FloatArray:
-        """Radius of the region for each of the straight pieces, shape (k,); [m]."""
-        margins = [self.margins[a:b].max() for a, b in pairwise(self._ends)]
-        return self.region.radius + np.array(margins)
 
     def largest_angle(self, points: FloatArray) -> float:
         """Largest link angle with the tip at points; infinite where there is none.
@@ -205,7 +188,7 @@ class AcrossRail:
             planar = self._moved(reference[blocked], move)
         except PathBlocked:
             return np.inf
-        angles = largest_angles(planar[:, self._ends], self._pieces)
+        angles = largest_angles(planar[:, self._ends], self._passing.lengths)
         return float(angles.max(initial=0.0))
 
 

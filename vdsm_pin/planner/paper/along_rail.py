@@ -1,6 +1,6 @@
 """One obstacle prismatic along the rail (obs1, obs2): Steps 4 and 5 put together.
 
-Each side of the obstacle has its rule for the joints (`side_rules.py`), found on the
+Each side of the obstacle has its rule for the joints (`joint_paths.py`), found on the
 waypoints wanted there; the tip keeps out of a region that holds those of both rules.
 Where links cannot follow a sharp corner of the section, blunter regions are tried.
 """
@@ -16,12 +16,16 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.approach import first_station
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.detours import detour_route, path_rows
-from vdsm_pin.planner.paper.joint_paths import SideRule, slide_joints
+from vdsm_pin.planner.paper.joint_paths import (
+    SideRule,
+    anchors,
+    bends,
+    choose_rule,
+    slide_joints,
+)
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps
 from vdsm_pin.planner.paper.sections import grown_by, planned_gap
-from vdsm_pin.planner.paper.shadow import visits
-from vdsm_pin.planner.paper.side_rules import anchors, bends, choose_rule
 from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
@@ -154,7 +158,7 @@ def _sequences(
     rows = path_rows(path, first_station(path, region)[0], region)
     wanted: dict[int, list[FloatArray]] = {1: [], -1: []}
     tip = project(rows.points)
-    for visit in visits(region, tip):
+    for visit in region.visits(tip):
         points = tip[visit.first : visit.last + 1]
         sides = {visit.entry, visit.exit} - {0}
         if len(sides) == 2:

@@ -4,13 +4,19 @@ The joints between the pieces (knots) all move by the same way along one axis: o
 them, or the two at the ends of a link that is laid past the obstacle.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.paper.region_kernels import keeps_out
+
+SCAN: Final = 12
+"""Moves of the bend tried before the first clear one is narrowed down."""
+
+HALVINGS: Final = 24
+"""Rounds of bisection: 2 m / 12 / 2^24 is 1e-8 m, far below every margin."""
 
 
 class Passing(NamedTuple):
@@ -75,30 +81,26 @@ def clear_bends(passing: Passing, bends: Bends) -> BoolArray:
 
 
 @compiled
-def least_moves(
-    passing: Passing, bends: Bends, farthest: FloatArray, scan: int, halvings: int
-) -> FloatArray:
+def least_moves(passing: Passing, bends: Bends, farthest: FloatArray) -> FloatArray:
     """Smallest moves of the knots that clear the region, shape (n,); nan for none.
 
     Args:
         passing: What is passed.
         bends: The arms before they move.
         farthest: Signed largest move along the axis, shape (n,); [m].
-        scan: Moves tried before the first clear one is narrowed down.
-        halvings: Rounds of bisection.
     """
     moves = np.full(len(farthest), np.nan)
     for k in range(len(farthest)):
         low, high = 0.0, np.nan
-        for step in range(1, scan + 1):
-            part = step / scan
+        for step in range(1, SCAN + 1):
+            part = step / SCAN
             if _clear(passing, bends, k, part * farthest[k]):
                 high = part
                 break
             low = part
         if np.isnan(high):
             continue
-        for _ in range(halvings):
+        for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             if _clear(passing, bends, k, middle * farthest[k]):
                 high = middle

@@ -5,6 +5,9 @@ body's, required clearance, margin), so its boundary is made of exact arcs and s
 sides. A joint that would fall inside slides along an auxiliary line onto the boundary
 (paper, 4.3); the tip walks along the boundary (4.2.3). An obstacle's section is such a
 region itself, not grown yet.
+
+Seen along X, the straight arm is a ray from P_1, and the region throws a shadow: a tip
+outside it is reached straight.
 """
 
 from dataclasses import dataclass, replace
@@ -26,6 +29,23 @@ from vdsm_pin.tolerances import TOLERANCES
 
 ARC_STEP: Final = float(np.deg2rad(0.25))
 """Turn between two corners of a walk along an arc; [rad]."""
+
+
+@dataclass(frozen=True)
+class Visit:
+    """Waypoints first to last (included) of the path that lie in the shadow in a row.
+
+    Args:
+        first: First waypoint.
+        last: Last waypoint.
+        entry: Edge by which the path came in, 1 or -1; 0 if it begins inside.
+        exit: Edge by which it leaves; 0 if it ends inside.
+    """
+
+    first: int
+    last: int
+    entry: int
+    exit: int
 
 
 @dataclass(frozen=True)
@@ -106,6 +126,23 @@ class DangerRegion:
         """Whether points outside lie behind the region as seen from P_1, (n,)."""
         touch = self.radius - TOLERANCES.on_boundary
         return covered(self.corners, self.radius, self.centre, touch, read_only(points))
+
+    def visits(self, points: FloatArray) -> list[Visit]:
+        """Stays in the shadow along a sequence of points outside or inside, (n, 2)."""
+        covered, inside = self.covers(points), self.contains(points)
+        x, y = self.centre
+        # Left or right of the ray from P_1 through the region's centre.
+        side = np.where(x * points[:, 1] - y * points[:, 0] > 0.0, 1, -1)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]])))
+        found = []
+        for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+            entry = exit_ = 0
+            if first > 0 and not inside[first - 1]:
+                entry = int(side[first - 1])
+            if last + 1 < len(points) and not inside[last + 1]:
+                exit_ = int(side[last + 1])
+            found.append(Visit(int(first), int(last), entry, exit_))
+        return found
 
     def walk(self, start: FloatArray, end: FloatArray, sense: int) -> FloatArray:
         """The taut way from start round the region to end.

@@ -18,9 +18,8 @@ import numpy as np
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.paper.approach import first_station
-from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.danger_region import DangerRegion, Visit
 from vdsm_pin.planner.paper.project import project
-from vdsm_pin.planner.paper.shadow import Visit, visits
 from vdsm_pin.planner.paper.tip_path import (
     Route,
     Rows,
@@ -124,7 +123,7 @@ def _drawable(rows: Rows, region: DangerRegion, judge: Judge) -> list[Rows]:
     # Two layers: waypoint k as the end of one part and as the beginning of the next.
     leaving, joining = np.zeros(len(rows), int), np.zeros(len(rows), int)
     drawn, cut = ~inside, np.zeros(len(rows), bool)
-    for visit in visits(region, points):
+    for visit in region.visits(points):
         span = slice(visit.first, visit.last + 1)
         before, after = _sides_drawn(rows, visit, region, judge)
         leaving[span], joining[span] = before, after
@@ -285,7 +284,7 @@ def _sides_on_way(
 ) -> IntArray | None:
     """The arm's side along a way; None where it cannot follow or would change side."""
     side = np.zeros(len(way), int)
-    for visit in visits(region, project(way.points)):
+    for visit in region.visits(project(way.points)):
         needs = {visit.entry, visit.exit}
         if visit.first == 0:
             needs.add(leaving)

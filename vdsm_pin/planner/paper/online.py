@@ -11,15 +11,13 @@ import numpy as np
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.paper.across_rail import AcrossRail
-from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.avoidance import Avoidance
-from vdsm_pin.planner.paper.joint_paths import slide_joints
 from vdsm_pin.planner.paper.lift import lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.solve import check_limits
-from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.paper.tip_path import Route
+from vdsm_pin.planner.records import Plan, TipPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
 
@@ -77,7 +75,10 @@ class OnlineRule:
             Infeasible: If a link is too short for it or a limit is broken.
         """
         points = tip[None]
-        planar = self._planar(points, side)
+        here = TipPath(points, np.zeros(1, np.bool_), np.zeros(1))
+        route = Route(here, np.array([side]), np.zeros((0, 2)))
+        reference = scale(self._arm, project(points))
+        planar = self._avoidance.joints(route, reference)
         centres = lift(self._arm, planar, points[:, 0])
         alpha, theta = joint_angles(self._arm, centres)
         x0 = centres[:, 0, 0]
@@ -85,14 +86,3 @@ class OnlineRule:
         angles = np.stack([alpha[0], theta[0]], axis=1).ravel()
         cables = cable_lengths(self._arm, alpha, theta)[0]
         return Command(np.concatenate([x0, angles]), cables)
-
-    def _planar(self, points: FloatArray, side: int) -> FloatArray:
-        """Steps 2, 3 and 5, shape (1, N + 1, 2); [m]."""
-        tip = project(points)
-        if isinstance(self._avoidance, AlongRail) and side:
-            rule = self._avoidance.rules[side]
-            return slide_joints(self._arm, np.ascontiguousarray(tip), rule)
-        reference = scale(self._arm, tip)
-        if isinstance(self._avoidance, AcrossRail):
-            return self._avoidance.bent(reference, points[:, 0])
-        return reference

@@ -52,6 +52,20 @@ class Slide(NamedTuple):
     [-]."""
 
 
+class Standing(NamedTuple):
+    """When a configuration can be taken."""
+
+    links: Links
+    """The arm."""
+
+    forbidden: Core
+    """What its links keep out of."""
+
+    largest_swing: float
+    """Largest change of a coordinate of a link's direction from one configuration to
+    the next; [-]."""
+
+
 @compiled
 def slide_of(core: Core, side: int, direction: FloatArray) -> Slide:
     """How joints get out of a region on a side, along lines of a direction."""
@@ -100,18 +114,15 @@ def slide_chains(slide: Slide, links: Links, planar: FloatArray) -> None:
 
 
 @compiled
-def extent_of(
-    chain: FloatArray, links: Links, forbidden: Core, directions: FloatArray
-) -> float:
+def extent_of(chain: FloatArray, able: Standing, directions: FloatArray) -> float:
     """Extent of one configuration along X; -1 where it cannot be taken; [m].
 
     Args:
         chain: P_1..P_{N+1}, shape (N + 1, 2); [m].
-        links: The arm.
-        forbidden: The region that the links keep out of.
+        able: When it can.
         directions: Set to those of the links, shape (N, 3); [-].
     """
-    extent = 0.0
+    (links, forbidden, _), extent = able, 0.0
     for i in range(links.lengths.shape[0]):
         uy = (chain[i + 1, 0] - chain[i, 0]) / links.lengths[i]
         uz = (chain[i + 1, 1] - chain[i, 1]) / links.lengths[i]
@@ -131,24 +142,18 @@ def extent_of(
 
 
 @compiled
-def standing(
-    planar: FloatArray, links: Links, forbidden: Core, largest_swing: float
-) -> BoolArray:
+def standing(planar: FloatArray, able: Standing) -> BoolArray:
     """Which configurations can be taken, neighbours following each other, (n,).
 
     Args:
         planar: P_1..P_{N+1} of each, shape (n, N + 1, 2); [m].
-        links: The arm.
-        forbidden: The region that the links keep out of.
-        largest_swing: Largest change of a coordinate of a link's direction from one
-            configuration to the next; [-].
+        able: When they can.
     """
-    able = np.zeros(planar.shape[0], np.bool_)
-    before = np.zeros((links.lengths.shape[0], 3))
-    here = np.zeros((links.lengths.shape[0], 3))
+    taken, n_links = np.zeros(planar.shape[0], np.bool_), planar.shape[1] - 1
+    before, here = np.zeros((n_links, 3)), np.zeros((n_links, 3))
     for k in range(planar.shape[0]):
-        able[k] = extent_of(planar[k], links, forbidden, here) > 0.0
-        if able[k] and k > 0 and able[k - 1]:
-            able[k] = np.abs(here - before).max() <= largest_swing
+        taken[k] = extent_of(planar[k], able, here) > 0.0
+        if taken[k] and k > 0 and taken[k - 1]:
+            taken[k] = np.abs(here - before).max() <= able.largest_swing
         before, here = here, before
-    return able
+    return taken

@@ -8,8 +8,8 @@ from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.paper.region_kernels import Core
 from vdsm_pin.planner.paper.sliding_kernels import (
-    Links,
     Slide,
+    Standing,
     extent_of,
     slide_chain,
     slide_of,
@@ -27,19 +27,6 @@ class Wanted(NamedTuple):
 
     stride: int
     """Rules are compared on every so manieth tip, then confirmed on all."""
-
-
-class Standing(NamedTuple):
-    """When a configuration can be taken."""
-
-    links: Links
-    """The arm."""
-
-    forbidden: Core
-    """What its links keep out of."""
-
-    largest_swing: float
-    """As in `standing`; [-]."""
 
 
 class Trials(NamedTuple):
@@ -90,7 +77,7 @@ def _reach(
     for k in range(0, tip.shape[0], stride):
         chain[n_links] = tip[k]
         slide_chain(slide, links, chain)
-        extent = extent_of(chain, links, able.forbidden, here)
+        extent = extent_of(chain, able, here)
         if extent < 0.0:
             return k, shortening
         if k > 0 and not np.abs(here - before).max() <= largest_swing:
