@@ -6,7 +6,6 @@ behind the next one; the base is fed along its rail. Obstacles are not looked at
 verification says whether the motion keeps clear of them.
 """
 
-import itertools
 from typing import Final
 
 import numpy as np
@@ -17,6 +16,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
+from vdsm_pin.planner.spacing import stepped
 from vdsm_pin.planner.start import check_start, start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -47,9 +47,9 @@ def plan_follow_the_leader(
     parts, alpha, theta = 1, np.zeros((0, 0)), np.zeros((0, 0))
     while True:
         step = problem.path.spacing / parts
-        approach = _stepped(way, step)
-        inner = _stepped(rows.tips, step)
-        stations = _stepped(rows.stations[:, None], step)[:, 0]
+        approach, _ = stepped(way, step)
+        inner, _ = stepped(rows.tips, step)
+        stations = stepped(rows.stations[:, None], step)[0][:, 0]
         tips = np.concatenate([approach[:-1], inner])
         on_path = np.arange(len(tips)) >= len(approach) - 1
         along = np.append(np.full(len(approach) - 1, stations[0]), stations)
@@ -70,20 +70,6 @@ def plan_follow_the_leader(
         trajectory,
         notes=(note,),
     )
-
-
-def _stepped(corners: FloatArray, step: float) -> FloatArray:
-    """Points along a polyline at most a step apart, corners kept, shape (n, d)."""
-    made = [corners[:1]]
-    for a, b in itertools.pairwise(corners):
-        count = max(
-            1, int(np.ceil(np.linalg.norm(b - a) / step - TOLERANCES.whole_parts))
-        )
-        share = np.arange(1, count + 1)[:, None] / count
-        side = (1.0 - share) * a + share * b
-        side[-1] = b
-        made.append(side)
-    return np.concatenate(made)
 
 
 def _check_rail(

@@ -4,7 +4,7 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.compiled import compiled
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, read_only
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -12,6 +12,41 @@ def count_of(parts: FloatArray) -> IntArray:
     """Whole numbers not less than these, but for rounding; same shape."""
     whole = np.ceil(np.asarray(parts) - TOLERANCES.whole_parts)
     return np.asarray(whole.astype(np.int64))
+
+
+def spread(counts: IntArray) -> tuple[IntArray, FloatArray]:
+    """Places that divide each interval evenly, the very last corner included.
+
+    Args:
+        counts: Number of places from each corner (included) to the next (left out).
+
+    Returns:
+        The interval of each place, and where in it, 0 to 1, shape (r,) each.
+    """
+    interval = np.repeat(np.arange(len(counts)), counts)
+    begin = np.cumsum(counts) - counts
+    share = (np.arange(counts.sum()) - begin[interval]) / counts[interval]
+    return np.append(interval, len(counts) - 1), np.append(share, 1.0)
+
+
+def stepped(corners: FloatArray, step: float) -> tuple[FloatArray, BoolArray]:
+    """Points along a polyline at most a step apart, and which are corners.
+
+    Args:
+        corners: Shape (k, d); [m].
+        step: [m].
+
+    Returns:
+        Shape (n, d), every corner among them; shape (n,).
+    """
+    sides = np.diff(corners, axis=0)
+    counts = np.maximum(1, count_of(np.linalg.norm(sides, axis=1) / step))
+    side = np.repeat(np.arange(len(counts)), counts)
+    number = 1 + np.arange(len(side)) - (np.cumsum(counts) - counts)[side]
+    points = corners[side] + sides[side] * number[:, None] / counts[side, None]
+    last = number == counts[side]
+    points[last] = corners[1:]
+    return np.concatenate([corners[:1], points]), np.append(True, last)
 
 
 def row_steps(

@@ -11,6 +11,7 @@ import numpy as np
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.fewest.tip_room import LEAST, NARROW, TipRoom
+from vdsm_pin.planner.spacing import spread
 from vdsm_pin.problem.pointing import angles_between
 
 PULLS: Final = 30
@@ -67,11 +68,9 @@ def refined(room: TipRoom, route: FloatArray) -> FloatArray:
     counts = np.maximum(1, np.ceil(sides / step).astype(np.int64))
     if (counts == 1).all():
         return route
-    at = np.repeat(np.arange(len(counts)), counts)
-    part = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    part = (part / counts[at])[:, None]
-    finer = (1.0 - part) * route[at] + part * route[at + 1]
-    return pulled(room, np.vstack([finer, route[-1:]]), FINER)
+    at, share = spread(counts)
+    part = share[:, None]
+    return pulled(room, (1.0 - part) * route[at] + part * route[at + 1], FINER)
 
 
 def pulled(

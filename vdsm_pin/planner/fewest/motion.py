@@ -28,7 +28,7 @@ from vdsm_pin.planner.fewest.pose_kernels import (
 )
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
-from vdsm_pin.planner.spacing import count_of, row_steps
+from vdsm_pin.planner.spacing import count_of, row_steps, spread
 from vdsm_pin.tolerances import TOLERANCES
 
 MOST_MORE, SOME_MORE = 20, 100_000
@@ -215,21 +215,6 @@ def rows_at(
     """Configurations at given places of the motion."""
     every = corners.pick(np.arange(len(corners.drawn)))
     return Rows(interval, share, every.centres(manipulator, interval, share))
-
-
-def spread(counts: IntArray) -> tuple[IntArray, FloatArray]:
-    """Places that divide each interval evenly, the very last corner included.
-
-    Args:
-        counts: Number of rows from each corner (included) to the next (left out).
-    """
-    interval = np.repeat(np.arange(len(counts)), counts)
-    begin = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    share = (np.arange(counts.sum()) - begin[interval]) / counts[interval]
-    return (
-        np.append(interval, len(counts) - 1),
-        np.append(share, 1.0),
-    )
 
 
 def dense_rows(

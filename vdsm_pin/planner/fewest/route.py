@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.spacing import count_of
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
+from vdsm_pin.planner.spacing import count_of, stepped
 from vdsm_pin.problem.desired_path import DesiredPath, Order
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
@@ -84,22 +84,12 @@ def path_rows(path: DesiredPath) -> PathRows:
         later, sooner = corners[corners > begin], corners[1:][corners[1:] < begin]
         end = [begin + path.length]
         corners = np.concatenate([[begin], later, sooner + path.length, end])
-    stations, corner = [corners[:1]], [np.ones(1, dtype=np.bool_)]
-    for a, b in itertools.pairwise(corners):
-        if not b > a:
-            continue
-        count = max(1, int(count_of((b - a) / path.spacing)))
-        side = a + (b - a) * np.arange(1, count + 1) / count
-        side[-1] = b
-        stations.append(side)
-        corner.append(np.arange(1, count + 1) == count)
-    if not path.length > 0.0:
-        # A single point is drawn by resting there: two rows at one place.
-        stations.append(corners[:1])
-        corner.append(np.ones(1, dtype=np.bool_))
-    every = np.concatenate(stations)
-    wrapped = np.where(every > path.length, every - path.length, every)
-    return PathRows(every, path.at(wrapped), np.concatenate(corner))
+    # A single point is drawn by resting there: two rows at one place.
+    corners = distinct(corners) if path.length > 0.0 else corners[[0, 0]]
+    rows, corner = stepped(corners[:, None], path.spacing)
+    stations = rows[:, 0]
+    wrapped = np.where(stations > path.length, stations - path.length, stations)
+    return PathRows(stations, path.at(wrapped), corner)
 
 
 def _layer_rows(rows: PathRows, closed: BoolArray, coarse: float) -> IntArray:
