@@ -36,6 +36,12 @@ def joint_centres(
     return centres_of(*values, manipulator.link_lengths)
 
 
+def row_centres(manipulator: Manipulator, joints: FloatArray) -> FloatArray:
+    """As `joint_centres`, of rows (x0, alpha1, theta1, ..), shape (n, 1 + 2N)."""
+    x0, alpha, theta = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
+    return joint_centres(manipulator, x0, alpha, theta)
+
+
 def link_frames(alpha: FloatArray, theta: FloatArray) -> FloatArray:
     """Orientations R_base_link of every link, R_i = R_{i-1} Rz(alpha_i) Ry(theta_i).
 

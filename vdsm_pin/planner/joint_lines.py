@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.kinematics import row_centres
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -45,8 +45,7 @@ def clear_line(
     while count <= MOST:
         share = np.arange(count + 1)[:, None] / count
         rows = (1.0 - share) * begin + share * end
-        centres = joint_centres(arm, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
-        clearances = clearance(centres).min(axis=1, initial=np.inf)
+        clearances = clearance(row_centres(arm, rows)).min(axis=1, initial=np.inf)
         if not (clearances >= need).all():
             return None
         if (clearances[:-1] + clearances[1:] - way / count >= 2.0 * need).all():

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.kinematics import row_centres
 from vdsm_pin.errors import InsideUnknown, StartBlocked, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
@@ -29,9 +29,7 @@ def start_centres(problem: PlanningProblem) -> FloatArray:
     """
     arm, path = problem.manipulator, problem.path
     if path.start_joints is not None:
-        joints = path.start_joints[None]
-        centres = joint_centres(arm, joints[:, 0], joints[:, 1::2], joints[:, 2::2])
-        return np.asarray(centres[0])
+        return np.asarray(row_centres(arm, path.start_joints[None])[0])
     across = arm.ratios[:, None] * path.start[1:]
     square = arm.total_length**2 - path.start[1:] @ path.start[1:]
     rise = np.sqrt(square) if square >= 0.0 else np.nan

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.kinematics import row_centres
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
@@ -197,7 +197,7 @@ def _spots(
     if problem.tip_path is None or not (between := even.on_path & ~places.old).any():
         return Trajectory.of_joints(q, even.on_path, even.path_m, even.times)
     path, path_m = problem.path, even.path_m.copy()
-    tips = joint_centres(problem.manipulator, q[:, 0], q[:, 1::2], q[:, 2::2])[:, -1]
+    tips = row_centres(problem.manipulator, q)[:, -1]
     k, run = places.row[between], runs(path, rows.path_m)[places.row[between]]
     begin, s = wrapped(path, rows.path_m)[k], path_m[between]
     low, high = np.minimum(begin, begin + run), np.maximum(begin, begin + run)

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.kinematics import row_centres
 from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -115,7 +115,7 @@ class _Motion:
     ) -> tuple[FloatArray, FloatArray]:
         """Angles to the aims with errors (NaN: no aim), and the aims' lengths."""
         rows = bernstein.value(self.pieces[interval], share)
-        centres = joint_centres(self.arm, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
+        centres = row_centres(self.arm, rows)
         station = self.station[interval] + share * self.run[interval]
         aims = self.path.aims(centres[:, -1], wrapped(self.path, station))
         axes = centres[:, -1] - centres[:, -2]

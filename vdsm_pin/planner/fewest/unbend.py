@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.kinematics import link_angles, row_centres
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
@@ -35,10 +35,6 @@ STRAY: Final = 0.3
 """How far these are from the line; the base goes by thirds of the arm; [rad]."""
 
 
-def _centres(arm: Manipulator, joints: FloatArray) -> FloatArray:
-    return joint_centres(arm, joints[:, 0], joints[:, 1::2], joints[:, 2::2])
-
-
 def leans_ahead(problem: PlanningProblem) -> bool:
     """Whether the chart holds the arm at its start."""
     joints = problem.path.start_joints
@@ -46,17 +42,17 @@ def leans_ahead(problem: PlanningProblem) -> bool:
 
 
 def _ahead(arm: Manipulator, joints: FloatArray) -> bool:
-    advance = np.diff(_centres(arm, joints[None])[0, :, 0])
+    advance = np.diff(row_centres(arm, joints[None])[0, :, 0])
     return bool((advance >= AHEAD * arm.link_lengths).all())
 
 
 def _targets(arm: Manipulator, start: FloatArray) -> Iterator[FloatArray]:
     """Joint values to move to, the nearest first."""
-    tip_x = float(_centres(arm, start[None])[0, -1, 0])
+    tip_x = float(row_centres(arm, start[None])[0, -1, 0])
     for part, shift in itertools.product(PARTS, SHIFTS):
         joints = part * start
         joints[0] = start[0]
-        advance = float(_centres(arm, joints[None])[0, -1, 0]) - tip_x
+        advance = float(row_centres(arm, joints[None])[0, -1, 0]) - tip_x
         joints[0] = min(max(start[0] - shift * advance, arm.base_range[0]),
                         arm.base_range[1])  # fmt: skip
         if _ahead(arm, joints):
@@ -87,7 +83,7 @@ def unbend(
     """
     arm, start = problem.manipulator, problem.path.start_joints
     assert start is not None
-    at_start = float(clearance(_centres(arm, start[None])).min())
+    at_start = float(clearance(row_centres(arm, start[None])).min())
     # The start may be closer than the margin asks for; the way out only gets better.
     need = min(problem.required_clearance + margin, at_start - TOLERANCES.joint_centre)
     need = max(need, problem.required_clearance)
@@ -121,7 +117,7 @@ def unbend(
 
 def from_there(problem: PlanningProblem, joints: FloatArray) -> PlanningProblem:
     """The same problem from other joint values, shape (1 + 2N,); [m], [rad]."""
-    tip = _centres(problem.manipulator, joints[None])[0, -1]
+    tip = row_centres(problem.manipulator, joints[None])[0, -1]
     return replace(
         problem, tip_path=replace(problem.path, start=tip, start_joints=joints)
     )
@@ -141,7 +137,7 @@ def with_unbending(problem: PlanningProblem, rows: FloatArray, plan: Plan) -> Pl
         np.concatenate([np.zeros(count, dtype=np.bool_), told.on_path]),
         np.concatenate([np.full(count, told.path_m[0]), told.path_m]),
     )
-    before = _centres(problem.manipulator, first)
+    before = row_centres(problem.manipulator, first)
     note = (
         f"a link leans backwards at the start: the arm unbends first, in {count} rows"
     )
