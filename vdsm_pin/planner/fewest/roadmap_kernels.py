@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import apart, borrowed, compiled
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.tolerances import TOLERANCES
 
 NEAR = 0.26
@@ -49,6 +49,18 @@ class Barred(NamedTuple):
 
     flagged: BoolArray
     keys: IntArray
+
+    @classmethod
+    def none(cls, n_nodes: int) -> "Barred":
+        """No edge is blocked."""
+        return cls(np.zeros(n_nodes, np.bool_), np.zeros(0, np.int64))
+
+    def more(self, edges: IntArray) -> "Barred":
+        """Further edges (u, v) blocked, shape (n, 2)."""
+        flagged = self.flagged.copy()
+        flagged[edges.ravel()] = True
+        keys = edges.min(axis=1) * flagged.size + edges.max(axis=1)
+        return Barred(flagged, distinct(np.concatenate([self.keys, keys])))
 
 
 class Weights(NamedTuple):

@@ -14,9 +14,10 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.planner.fewest.roadmap import Roadmap, nothing_barred, with_barred
+from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.roadmap_kernels import (
     FROM_START,
+    Barred,
     Labels,
     Weights,
     stage_programme,
@@ -73,7 +74,7 @@ class Planner:
 
     def __init__(self, roadmap: Roadmap, length: float, start_node: int) -> None:
         self.roadmap, self.start_node, self.graph = roadmap, start_node, roadmap.graph()
-        self.barred = nothing_barred(len(roadmap.node))
+        self.barred = Barred.none(len(roadmap.node))
         route = roadmap.route
         self.gap = np.concatenate([[0.0], np.diff(route.stations) / length])
         # Resting at a single point costs like a stretch, or it would be left out.
@@ -91,7 +92,7 @@ class Planner:
             edges: Pairs of nodes, shape (n, 2).
             on_connections: Whether one of them was part of a way, so that ways change.
         """
-        self.barred = with_barred(self.barred, edges)
+        self.barred = self.barred.more(edges)
         route = self.roadmap.route
         for a, b in self.roadmap.tips_of(edges):
             for u, v in ((a, b), (b, a)):

@@ -133,8 +133,10 @@ def one_knee_shapes(
     change = np.full(len(here), 2.0 * step)
     change[: turns[0].size] = np.tile(gaps, len(joints))
     links = np.column_stack([here, there, change])
-    slopes = np.tile(disc * step, (len(joints), 1))
-    return _shapes(np.repeat(joints, len(disc)), slopes, links, step)
+    knees = np.append(0, np.repeat(joints, len(disc)))
+    slopes = np.vstack([np.zeros(2), np.tile(disc * step, (len(joints), 1))])
+    rows = _compressed(links, len(knees))
+    return Shapes(knees, slopes, *rows, step, np.zeros((0, 0, 2)))
 
 
 def _beside(points: IntArray) -> IntArray:
@@ -155,16 +157,6 @@ def _compressed(links: FloatArray, count: int) -> tuple[IntArray, IntArray, Floa
     links = links[order]
     first = np.searchsorted(links[:, 0], np.arange(count + 1))
     return first.astype(np.int64), links[:, 1].astype(np.int64), links[:, 2].copy()
-
-
-def _shapes(
-    knees: IntArray, slopes: FloatArray, links: FloatArray, step: float
-) -> Shapes:
-    count = 1 + len(knees)
-    all_knees, all_slopes = np.append(0, knees), np.vstack([np.zeros(2), slopes])
-    first, neighbours, change = _compressed(links, count)
-    none = np.zeros((0, 0, 2))
-    return Shapes(all_knees, all_slopes, first, neighbours, change, step, none)
 
 
 def _offsets(

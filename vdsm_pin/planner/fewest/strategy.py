@@ -36,7 +36,6 @@ from vdsm_pin.planner.fewest.unbend import (
 )
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.start import check_start
-from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -68,7 +67,7 @@ def plan_fewest(
     Raises:
         Infeasible: With the proof where there is one, else `NoPlanFound`.
     """
-    return _plan(problem, clearance, _largest(margin), "fewest", FEWEST)
+    return _Search(problem, clearance, _largest(margin), "fewest", FEWEST).plan()
 
 
 def _largest(margin: Margin) -> float:
@@ -147,20 +146,88 @@ class _Search:
         """Clearance that every plan keeps; [m]."""
         return self.problem.required_clearance + self.margin
 
-    def plan(self) -> Plan:
-        return _plan(self.problem, self.clearance, self.margin, self.name, self.weights)
+    def plan(self, effort: Effort = FULL) -> Plan:
+        """What is found with an effort.
+
+        Raises:
+            Infeasible: If nothing is.
+        """
+        problem, clearance = self.problem, self.clearance
+        check_start(problem, clearance)
+        check_cone(problem)
+        if not leans_ahead(problem):
+            try:
+                rows = unbend(problem, clearance, self.margin)
+                there = replace(self, problem=from_there(problem, rows[-1]))
+                return with_unbending(problem, rows, there.plan(effort))
+            except NoPlanFound:
+                effort = LEANING
+        if problem.path.pointing is not None and effort is not LEANING:
+            effort = pointed(effort)
+        return self._explored(effort)
+
+    def _explored(self, effort: Effort) -> Plan:
+        """`plan` of a problem whose start the chart holds, or by directions."""
+        problem, reach = self.problem, float(levers(self.problem.manipulator)[-1])
+        # What is kept is judged exactly, however much it is.
+        most = self.margin + self.weights.joint_error * reach
+        quick = broad_phase(problem, self.clearance)
+        quick = quick.up_to(quick.far + most)
+        early = replace(quick, deadline=_early(quick.deadline))
+        soon = _soon(problem, quick.deadline)
+        best: Outcome | None = None
+        try:
+            for outcome in explore(
+                problem, early, self.margin, self.weights, effort, soon
+            ):
+                best = outcome
+                say_drawn(problem, best)
+                refuse_proved(problem, best)
+            assert best is not None
+            refuse(problem, best)
+            return self._written(quick, best)
+        except OutOfTime as ended:
+            reached = "" if best is None else how_far(problem, best, quick.deadline)
+            raise OutOfTime(ended.limit, reached) from None
+
+    def _written(self, clearance: BroadPhase, outcome: Outcome) -> Plan:
+        """What was found, smoothed and row by row."""
+        assert outcome.found is not None
+        problem, weights, judge = self.problem, self.weights, outcome.judge
+        arm, corners = problem.manipulator, outcome.found.corners
+        grown = not isinstance(outcome.found, Searched)
+        if grown:
+            corners = sparser(judge, corners)
+        corners = shortcut(judge, corners, weights)
+        # What is straighter has more knees to spare. A roadmap has few but for an aim.
+        if weights == FEWEST and (grown or problem.path.pointing is not None):
+            corners = sparser(judge, corners)
+        corners = lifted(judge, straightened(judge, corners))
+        turn = problem.planned_row_change
+        rows = dense_rows(arm, corners, problem.path.spacing, turn, judge.slack)
+        alpha, theta = joint_angles(arm, rows.centres)
+        # Proofs of what is needed ask no more than whether there is the clearance
+        # required.
+        enough = clearance.up_to(problem.required_clearance)
+        stations, on_path = _stations(corners, rows)
+        trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
+        return Plan(
+            problem,
+            self.name,
+            rows.centres,
+            trajectory,
+            undrawn(problem, outcome),
+            notes_of(problem, enough, outcome, trajectory, rows.centres),
+        )
 
     def with_reserve(self, reserve: float) -> Plan:
-        return _plan(
-            self.problem, self.clearance, self.margin + reserve, self.name,
-            self.weights, QUICK,
-        )  # fmt: skip
+        """One that keeps so much more clearance; [m]."""
+        return replace(self, margin=self.margin + reserve).plan(QUICK)
 
     def with_joint_error(self, error: float) -> Plan:
+        """One whose links keep what such an error of all joints uses up; [rad]."""
         weights = replace(self.weights, joint_error=error)
-        return _plan(
-            self.problem, self.clearance, self.margin, self.name, weights, QUICK
-        )
+        return replace(self, weights=weights).plan(QUICK)
 
     def clearer(self, first: Plan) -> tuple[list[Plan], float]:
         """Plans with more and more clearance, and what the last has in reserve; [m]."""
@@ -192,93 +259,16 @@ class _Search:
         return float(clearances.min(initial=np.inf))
 
 
-def _plan(
-    problem: PlanningProblem,
-    clearance: LinkClearance,
-    margin: float,
-    name: str,
-    weights: CostWeights,
-    effort: Effort = FULL,
-) -> Plan:
-    check_start(problem, clearance)
-    check_cone(problem)
-    if not leans_ahead(problem):
-        try:
-            rows = unbend(problem, clearance, margin)
-            there = from_there(problem, rows[-1])
-            rest = _plan(there, clearance, margin, name, weights, effort)
-            return with_unbending(problem, rows, rest)
-        except NoPlanFound:
-            effort = LEANING
-    if problem.path.pointing is not None and effort is not LEANING:
-        effort = pointed(effort)
-    # What is kept is judged exactly, however much it is.
-    most = margin + weights.joint_error * float(levers(problem.manipulator)[-1])
-    quick = broad_phase(problem, clearance)
-    quick = quick.up_to(quick.far + most)
-    early = replace(quick, deadline=_early(quick.deadline))
-    best: Outcome | None = None
-    try:
-        soon = _soon(problem, clearance)
-        for outcome in explore(problem, early, margin, weights, effort, soon):
-            best = outcome
-            say_drawn(problem, best)
-            refuse_proved(problem, best)
-        assert best is not None
-        refuse(problem, best)
-        return _written(problem, quick, name, weights, best)
-    except OutOfTime as ended:
-        reached = "" if best is None else how_far(problem, best, quick.deadline)
-        raise OutOfTime(ended.limit, reached) from None
-
-
 def _early(deadline: Deadline) -> Deadline:
     """When the search ends, so that there is time to tell what stopped it."""
     return deadline.earlier(min(LAST, TOLD * deadline.limit))
 
 
-def _soon(problem: PlanningProblem, clearance: LinkClearance) -> Deadline:
+def _soon(problem: PlanningProblem, deadline: Deadline) -> Deadline:
     """From when on a part of the path will do, so that its proof is in time."""
-    deadline = deadline_of(clearance)
     if problem.path.blocked is Blocked.FAIL or deadline.end == np.inf:
         return NO_LIMIT
     return deadline.earlier((1.0 - SEARCHED) * deadline.left)
-
-
-def _written(
-    problem: PlanningProblem,
-    clearance: BroadPhase,
-    name: str,
-    weights: CostWeights,
-    outcome: Outcome,
-) -> Plan:
-    """What was found, smoothed and row by row."""
-    assert outcome.found is not None
-    judge, arm = outcome.judge, problem.manipulator
-    corners = outcome.found.corners
-    grown = not isinstance(outcome.found, Searched)
-    if grown:
-        corners = sparser(judge, corners)
-    corners = shortcut(judge, corners, weights)
-    # What is straighter has more knees to spare. A roadmap has few but for an aim.
-    if weights == FEWEST and (grown or problem.path.pointing is not None):
-        corners = sparser(judge, corners)
-    corners = lifted(judge, straightened(judge, corners))
-    turn = problem.planned_row_change
-    rows = dense_rows(arm, corners, problem.path.spacing, turn, judge.slack)
-    alpha, theta = joint_angles(arm, rows.centres)
-    # Proofs of what is needed ask no more than whether there is the clearance required.
-    enough = clearance.up_to(problem.required_clearance)
-    stations, on_path = _stations(corners, rows)
-    trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
-    return Plan(
-        problem,
-        name,
-        rows.centres,
-        trajectory,
-        undrawn(problem, outcome),
-        notes_of(problem, enough, outcome, trajectory, rows.centres),
-    )
 
 
 def _stations(corners: Corners, rows: Rows) -> tuple[FloatArray, BoolArray]:
