@@ -15,7 +15,7 @@ from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows
 from vdsm_pin.planner.fewest.offset_kernels import mutated_offsets
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
-from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, build_roadmap
+from vdsm_pin.planner.fewest.roadmap import CostWeights, build_roadmap
 from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
@@ -103,9 +103,9 @@ def test_bent_arms_are_tried_only_near_where_the_straight_one_does_not_do() -> N
     shut = np.zeros(len(rows.tips), dtype=np.bool_)
     route = tip_route(task, rows, shut, 0.08, 0.0)
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
-    pricing = Pricing(0.0035, 0.74, ARM.total_length, CostWeights())
+    judge = Judge(task, clearance, 0.0, 0.0, 2e-3)
     every, some = (
-        build_roadmap(task, clearance, pricing, route, shapes, around)
+        build_roadmap(judge, CostWeights(), route, shapes, around)
         for around in (None, 3)
     )
     assert set(some.node.tolist()) < set(every.node.tolist())

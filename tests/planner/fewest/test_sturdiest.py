@@ -83,10 +83,8 @@ def test_each_link_keeps_its_own() -> None:
     route = tip_route(task, rows, np.zeros(len(rows.tips), dtype=np.bool_), 0.2, 0.0)
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.2, 8)
     judge = Judge(task, clearance, 0.0, 0.0, 2e-3, kept=kept)
-    made, free = (
-        build_roadmap(task, clearance, judge.pricing(one), route, shapes)
-        for one in (weights, CostWeights())
-    )
+    bare = Judge(task, clearance, 0.0, 0.0, 2e-3)
+    made, free = (build_roadmap(one, weights, route, shapes) for one in (judge, bare))
     tip, shape = np.divmod(free.node, shapes.size)
     tips = route.tips[tip]
     offsets = shapes.offsets(ARM, tips, shape)

@@ -156,7 +156,7 @@ def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
     drawn, length = _drawn(problem, outcome), problem.path.length
     corners = outcome.found.corners
     on = np.flatnonzero(corners.drawn)
-    _, changed, _ = outcome.judge.look(corners.tips[on], corners.offsets[on])
+    changed = outcome.judge.look(corners.tips[on], corners.offsets[on]).changed
     if length == 0.0:
         say("reaches the goal, bending at most %d joints", int(changed.max()))
         return

@@ -17,7 +17,7 @@ from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.grown_nodes import fill
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.joint_error import link_margins
-from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.judge import Judge, link_limit
 from vdsm_pin.planner.fewest.levels import (
     FULL,
     SEED,
@@ -30,7 +30,6 @@ from vdsm_pin.planner.fewest.roadmap import (
     CostWeights,
     Roadmap,
     build_roadmap,
-    link_limit,
 )
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, rolled, tip_route
 from vdsm_pin.planner.fewest.search import Found, Searched, search
@@ -308,9 +307,7 @@ def _look(
     coarse, back = level.coarse * length, level.back * length
     shapes = one_knee_shapes(arm, judge.limit, STEP, PLACES)
     route = tip_route(problem, rows, proof.closed, coarse, back)
-    roadmap = build_roadmap(
-        problem, judge.rough, judge.pricing(weights), route, shapes, level.around
-    )
+    roadmap = build_roadmap(judge, weights, route, shapes, level.around)
     roadmap, start_node = with_start(judge, roadmap, weights)
     rng, standing = np.random.default_rng(SEED), np.diff(roadmap.tip_nodes) > 0
     found = search(judge, roadmap, start_node, level.rounds)

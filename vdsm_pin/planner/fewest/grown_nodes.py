@@ -48,12 +48,9 @@ def tied_in(
     every, places = np.concatenate(offsets), np.concatenate(tips)
     links.append(_ties(judge, roadmap, places, every))
     positions = route.tips[places]
-    clearances, _, _ = judge.look(positions, every)
-    bends = judge.bends(positions, every)
-    return extended(
-        roadmap, judge.pricing(weights), places, bends, clearances,
-        shapes.with_grown(every, np.vstack(links)),
-    )  # fmt: skip
+    clearances = judge.look(positions, every).clearances
+    more = shapes.with_grown(every, np.vstack(links))
+    return extended(roadmap, judge, weights, places, every, clearances, more)
 
 
 TIES = 4

@@ -147,7 +147,7 @@ class Population:
         """
         tips = np.repeat(self.layers.tips[:1], len(roots), axis=0)
         none = np.full(len(roots), -1)
-        clearances, _, _ = self.judge.look(tips, roots)
+        clearances = self.judge.look(tips, roots).clearances
         self.grown = Grown(1 + none, tips, roots, clearances, none)
         farthest = np.arange(len(roots))
         generations, backtracks = [farthest], 0
@@ -201,7 +201,7 @@ class Population:
         tips, offsets = tips[layer], coordinates(self.arm, laid[layer], directed)
         offsets[:1] = root.offsets
         aims = self.layers.asked(layer)
-        clearances, _, _ = judge.look(tips, offsets, aims)
+        clearances = judge.look(tips, offsets, aims).clearances
         clearances[0] = max(clearances[0], root.clearances[0])
         looking = None if aims is None else np.stack([aims[:-1], aims[1:]], axis=1)
         lines = Intervals(tips[:-1], tips[1:], offsets[:-1], offsets[1:], looking)

@@ -7,7 +7,7 @@ This is a planner's check; the proof over continuous time is the verifier's.
 """
 
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.interval_parts import LONG_TRAVEL, Parts, parts_of_pieces
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pieces_of
-from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import ANYWHERE, AimError, LastLinkCone
@@ -26,12 +25,18 @@ CUTS: Final = 16
 """Times an interval is cut; the body moves 65,536 times less in what is left then."""
 NEAR_LIMIT: Final = 0.9
 """An interval is looked at for its link angles if an end has so much of the largest."""
-LOOKS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+PLACES: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 """Places of an interval at which it is seen where the last link looks; [-]."""
 STEADY: Final = 2e-4
 """More of its cone that is kept in reserve; [rad]."""
 THIRDS: Final = 40
 """Times the place where the base is farthest back is looked for in two thirds."""
+
+
+def link_limit(problem: PlanningProblem) -> float:
+    """Largest link angle that keeps cone and box: |theta|, |alpha| <= psi; [rad]."""
+    arm = problem.manipulator
+    return min(arm.max_link_angle, arm.max_joint_angle)
 
 
 def _cone(problem: PlanningProblem, slack: float) -> LastLinkCone:
@@ -72,6 +77,20 @@ def check_cone(problem: PlanningProblem) -> None:
         raise NoPlanFound(message)
 
 
+class Looks(NamedTuple):
+    """What configurations come to."""
+
+    clearances: FloatArray
+    """Least clearance beyond what links keep, -inf where a limit is broken, shape
+    (n,); [m]."""
+
+    changed: IntArray
+    """Number of changed link angles, shape (n,)."""
+
+    largest: FloatArray
+    """Largest link angle, shape (n,); [rad]."""
+
+
 class Judge:
     """Asks the clearance function about places of a motion.
 
@@ -105,11 +124,6 @@ class Judge:
         self.limit = ease * link_limit(problem)
         self.cone = _cone(problem, slack)
 
-    def pricing(self, weights: CostWeights) -> Pricing:
-        """What configurations keep and cost by some weights."""
-        length = self.problem.manipulator.total_length
-        return Pricing(self.required, self.limit, length, weights, self.cone)
-
     def lines(self, corners: Corners, intervals: IntArray) -> Intervals:
         """Some intervals of a motion, with where the last link shall look on the path.
 
@@ -127,18 +141,13 @@ class Judge:
 
     def look(
         self, tips: FloatArray, offsets: FloatArray, aims: FloatArray | None = None
-    ) -> tuple[FloatArray, IntArray, FloatArray]:
+    ) -> Looks:
         """Clearance, changed angles and largest angle of configurations.
 
         Args:
             tips: Shape (n, 3); [m].
             offsets: Shape (n, N + 1, 2); [m].
             aims: Where the last link shall look, shape (n, 3); None for anywhere.
-
-        Returns:
-            Least clearance beyond what links keep, -inf where a limit is broken, shape
-            (n,) [m]; number of changed link angles, (n,); largest link angle, (n,)
-            [rad].
         """
         still = Intervals(tips, tips, offsets, offsets)
         knees = self._cuts(still)
@@ -151,7 +160,7 @@ class Judge:
             clearances[~self._aimed(centres, aims)] = -np.inf
         angles = bends_of(centres)
         changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
-        return clearances.min(axis=1), changed, angles.max(axis=1)
+        return Looks(clearances.min(axis=1), changed, angles.max(axis=1))
 
     def _aimed(self, centres: FloatArray, aims: FloatArray) -> BoolArray:
         """Whether last links look where they shall, shape (n,)."""
@@ -324,7 +333,7 @@ class Judge:
         asked = np.flatnonzero(np.isfinite(intervals.aims).all(axis=(1, 2)))
         begin, end = intervals.aims[asked, 0], intervals.aims[asked, 1]
         arm = self.problem.manipulator
-        for share in LOOKS if asked.size else ():
+        for share in PLACES if asked.size else ():
             inner = intervals.centres(arm, asked, np.full(len(asked), share))
             kept[asked] &= self._aimed(inner, (1.0 - share) * begin + share * end)
         return kept

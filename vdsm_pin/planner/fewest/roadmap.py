@@ -6,14 +6,13 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
-from vdsm_pin.planner.fewest.joint_error import link_by_link, link_margins
-from vdsm_pin.planner.fewest.roadmap_kernels import Barred, Graph, pose_shapes
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.fewest.joint_error import link_by_link
+from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.roadmap_kernels import Graph, pose_shapes
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
-from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.pointing import ANYWHERE, LastLinkCone
 from vdsm_pin.tolerances import TOLERANCES
 
 STRAIN: Final = 0.032
@@ -46,46 +45,6 @@ class CostWeights:
 
 
 @dataclass(frozen=True)
-class Pricing:
-    """What configurations must keep and what they cost.
-
-    Args:
-        required: Clearance to keep; [m].
-        limit: Largest link angle; [rad].
-        length: Of the arm; [m].
-        weights: What the strategy prefers.
-        cone: Where last links may look.
-    """
-
-    required: float
-    limit: float
-    length: float
-    weights: CostWeights
-    cone: LastLinkCone = ANYWHERE
-
-    def prices(
-        self, bends: FloatArray, clearances: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Cost of a length drawn, and what entering adds to a way, shape (v,) each.
-
-        Args:
-            bends: Link angles, shape (v, k); [rad].
-            clearances: Clearances, shape (v,); [m].
-        """
-        weights, most = self.weights, bends.max(axis=1, initial=0.0)
-        changed = (bends > TOLERANCES.changed_angle).sum(axis=1)
-        spare = (clearances - self.required) / self.length
-        lack = np.maximum(0.0, 1.0 - spare / weights.clearance)
-        over = np.maximum(0.0, most - weights.easy_bend)
-        bent = (over / max(self.limit - weights.easy_bend, 0.02)) ** 2
-        narrow, steep = weights.clearance_cost * lack**2, weights.bend_cost * bent
-        return (
-            np.asarray(weights.angle * changed + narrow + steep),
-            np.asarray(STRAIN * (0.2 * narrow + steep)),
-        )
-
-
-@dataclass(frozen=True)
 class Roadmap:
     """Clear configurations (nodes) and what a length drawn with each costs.
 
@@ -109,6 +68,12 @@ class Roadmap:
     lean: FloatArray
     cost: FloatArray
     strain: FloatArray
+
+    @classmethod
+    def empty(cls, route: TipRoute, shapes: Shapes) -> "Roadmap":
+        """Without nodes."""
+        none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
+        return cls(route, shapes, none, none, none, nothing, nothing, nothing)
 
     def graph(self) -> Graph:
         """What the compiled loops read."""
@@ -142,16 +107,9 @@ class Roadmap:
         return tips, self.shapes.offsets(manipulator, tips, self.shapes_of(nodes))
 
 
-def link_limit(problem: PlanningProblem) -> float:
-    """Largest link angle that keeps cone and box: |theta|, |alpha| <= psi; [rad]."""
-    arm = problem.manipulator
-    return min(arm.max_link_angle, arm.max_joint_angle)
-
-
 def build_roadmap(
-    problem: PlanningProblem,
-    clearance: LinkClearance,
-    pricing: Pricing,
+    judge: Judge,
+    weights: CostWeights,
     route: TipRoute,
     shapes: Shapes,
     around: int | None = None,
@@ -159,32 +117,31 @@ def build_roadmap(
     """Every shape at every tip that keeps limits and clearance.
 
     Args:
-        problem: Arm and limits.
-        clearance: The clearance function.
-        pricing: What nodes keep and cost.
+        judge: Says what nodes keep.
+        weights: What the strategy prefers.
         route: The tips.
         shapes: The shapes.
         around: Only the straight arm is tried at tips farther than this many tips from
             where the straight arm does not do; None: every shape at every tip.
     """
-    arm, weights, required = problem.manipulator, pricing.weights, pricing.required
-    kept, aims = link_margins(arm, weights.joint_error), _aims(problem, route)
+    problem, kept = judge.problem, judge.kept
+    arm, aims = problem.manipulator, _aims(problem, route)
 
     def tried(whole: BoolArray) -> Roadmap:
         node, ends, bends = pose_shapes(
-            route.tips, whole, shapes.knees, shapes.slopes, arm.stations, pricing.limit,
+            route.tips, whole, shapes.knees, shapes.slopes, arm.stations, judge.limit,
             arm.base_range,
         )  # fmt: skip
         if aims is not None:
             there, axes = aims[node // shapes.size], ends[:, 2] - ends[:, 1]
-            looks = pricing.cone.holds(ends[:, 0, 0], axes, there)
+            looks = judge.cone.holds(ends[:, 0, 0], axes, there)
             node, ends, bends = node[looks], ends[looks], bends[looks]
         if kept is not None or not problem.held.alike:
             ends = link_by_link(ends, arm.stations)
-        clearances = _least(clearance, ends, required, kept)
-        keep = clearances >= required
-        return _assemble(
-            pricing, route, shapes, node[keep], bends[keep], clearances[keep]
+        clearances = _least(judge, ends)
+        keep, empty = clearances >= judge.required, Roadmap.empty(route, shapes)
+        return _with_nodes(
+            empty, judge, weights, node[keep], bends[keep], clearances[keep]
         )
 
     count = len(route.tips)
@@ -205,27 +162,20 @@ def _aims(problem: PlanningProblem, route: TipRoute) -> FloatArray | None:
     return aims
 
 
-def _least(
-    clearance: LinkClearance,
-    ends: FloatArray,
-    required: float,
-    kept: FloatArray | None,
-) -> FloatArray:
+def _least(judge: Judge, ends: FloatArray) -> FloatArray:
     """Least clearance of the pieces, from the tip back to the first that lacks it.
 
     Args:
-        clearance: The clearance function.
+        judge: Says what is kept.
         ends: Ends of the pieces, shape (v, p + 1, 3); [m].
-        required: Clearance below which a piece lacks it; [m].
-        kept: What each piece keeps besides, shape (p,); None for nothing; [m].
     """
-    clearances = np.full(len(ends), np.inf)
+    clearances, kept = np.full(len(ends), np.inf), judge.kept
     rows = np.arange(len(ends))
     for piece in range(ends.shape[1] - 2, -1, -1):
-        values = clearance(ends[rows, piece : piece + 2], piece)[:, 0]
+        values = judge.rough(ends[rows, piece : piece + 2], piece)[:, 0]
         values = values if kept is None else values - kept[piece]
         clearances[rows] = np.minimum(clearances[rows], values)
-        rows = rows[values >= required]
+        rows = rows[values >= judge.required]
     return clearances
 
 
@@ -239,44 +189,70 @@ def _spread(route: TipRoute, picked: BoolArray, times: int) -> BoolArray:
     return picked
 
 
-def _assemble(
-    pricing: Pricing,
-    route: TipRoute,
-    shapes: Shapes,
+def _prices(
+    judge: Judge, weights: CostWeights, bends: FloatArray, clearances: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Cost of a length drawn, and what entering adds to a way, shape (v,) each.
+
+    Args:
+        judge: Says what is kept.
+        weights: What the strategy prefers.
+        bends: Link angles, shape (v, k); [rad].
+        clearances: Clearances, shape (v,); [m].
+    """
+    most = bends.max(axis=1, initial=0.0)
+    changed = (bends > TOLERANCES.changed_angle).sum(axis=1)
+    spare = (clearances - judge.required) / judge.problem.manipulator.total_length
+    lack = np.maximum(0.0, 1.0 - spare / weights.clearance)
+    over = np.maximum(0.0, most - weights.easy_bend)
+    bent = (over / max(judge.limit - weights.easy_bend, 0.02)) ** 2
+    narrow, steep = weights.clearance_cost * lack**2, weights.bend_cost * bent
+    cost = weights.angle * changed + narrow + steep
+    return np.asarray(cost), np.asarray(STRAIN * (0.2 * narrow + steep))
+
+
+def _with_nodes(
+    roadmap: Roadmap,
+    judge: Judge,
+    weights: CostWeights,
     node: IntArray,
     bends: FloatArray,
     clearances: FloatArray,
 ) -> Roadmap:
-    cost, strain = pricing.prices(bends, clearances)
-    lean = bends[:, KNEES].sum(axis=1)
-    lean[node % shapes.size == 0] = 0.0
-    return _indexed(Roadmap(route, shapes, node, node, node, lean, cost, strain))
+    """The roadmap with further nodes, in order and with its indices made.
 
-
-def _indexed(roadmap: Roadmap) -> Roadmap:
-    """The roadmap with its nodes in order and its indices made."""
+    Args:
+        roadmap: Before.
+        judge: Says what nodes keep.
+        weights: What the strategy prefers.
+        node: Of each new node, see `Roadmap`, shape (g,).
+        bends: Link angles of each, shape (g, k); [rad].
+        clearances: Clearance of each, shape (g,); [m].
+    """
     n_tips, n_shapes = len(roadmap.route.tips), roadmap.shapes.size
-    order = np.argsort(roadmap.node, kind="stable")
-    node = roadmap.node[order]
-    index = np.full(n_tips * n_shapes, -1)
-    index[node] = np.arange(len(node))
-    tip_nodes = np.searchsorted(node, np.arange(n_tips + 1) * n_shapes)
+    cost, strain = _prices(judge, weights, bends, clearances)
+    lean = np.where(node % n_shapes == 0, 0.0, bends[:, KNEES].sum(axis=1))
+    every = np.concatenate([roadmap.node, node])
+    order = np.argsort(every, kind="stable")
+    every, index = every[order], np.full(n_tips * n_shapes, -1)
+    index[every] = np.arange(len(every))
     return replace(
         roadmap,
-        node=node,
+        node=every,
         index=index,
-        tip_nodes=tip_nodes,
-        lean=roadmap.lean[order],
-        cost=roadmap.cost[order],
-        strain=roadmap.strain[order],
+        tip_nodes=np.searchsorted(every, np.arange(n_tips + 1) * n_shapes),
+        lean=np.concatenate([roadmap.lean, lean])[order],
+        cost=np.concatenate([roadmap.cost, cost])[order],
+        strain=np.concatenate([roadmap.strain, strain])[order],
     )
 
 
 def extended(
     roadmap: Roadmap,
-    pricing: Pricing,
+    judge: Judge,
+    weights: CostWeights,
     tips: IntArray,
-    bends: FloatArray,
+    offsets: FloatArray,
     clearances: FloatArray,
     shapes: Shapes,
 ) -> Roadmap:
@@ -284,36 +260,16 @@ def extended(
 
     Args:
         roadmap: Before.
-        pricing: What nodes keep and cost.
+        judge: Says what nodes keep.
+        weights: What the strategy prefers.
         tips: Tip number of each new node, shape (g,).
-        bends: Link angles of each, shape (g, N); [rad].
+        offsets: Of each, shape (g, N + 1, 2); [m].
         clearances: Clearance of each, shape (g,); [m].
         shapes: The shapes with the new ones at their end.
     """
     old, every = roadmap.shapes.size, np.arange(len(roadmap.node))
     same = roadmap.tips_of(every) * shapes.size + roadmap.shapes_of(every)
     fresh = tips * shapes.size + old + np.arange(len(tips))
-    more = _assemble(pricing, roadmap.route, shapes, fresh, bends, clearances)
-    return _indexed(
-        replace(
-            roadmap,
-            shapes=shapes,
-            node=np.concatenate([same, more.node]),
-            lean=np.concatenate([roadmap.lean, more.lean]),
-            cost=np.concatenate([roadmap.cost, more.cost]),
-            strain=np.concatenate([roadmap.strain, more.strain]),
-        )
-    )
-
-
-def nothing_barred(n_nodes: int) -> Barred:
-    """No edge is blocked."""
-    return Barred(np.zeros(n_nodes, dtype=np.bool_), np.zeros(0, dtype=np.int64))
-
-
-def with_barred(barred: Barred, edges: IntArray) -> Barred:
-    """Further edges (u, v) blocked, shape (n, 2)."""
-    flagged = barred.flagged.copy()
-    flagged[edges.ravel()] = True
-    keys = edges.min(axis=1) * flagged.size + edges.max(axis=1)
-    return Barred(flagged, distinct(np.concatenate([barred.keys, keys])))
+    bends = judge.bends(roadmap.route.tips[tips], offsets)
+    wider = replace(roadmap, shapes=shapes, node=same)
+    return _with_nodes(wider, judge, weights, fresh, bends, clearances)

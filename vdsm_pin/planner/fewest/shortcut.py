@@ -1,33 +1,16 @@
 """Shorter motions: stretches of corners replaced by straight lines in the chart."""
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vdsm_pin.compiled import compiled
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
-from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, distinct
+from vdsm_pin.planner.fewest.judge import Judge, Looks
 from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.tolerances import TOLERANCES
-
-
-@dataclass(frozen=True)
-class _State:
-    """What a replacement is held against, corner by corner."""
-
-    changed: IntArray
-    bend: FloatArray
-    clearances: FloatArray
-
-    def taken(self, other: "_State", rows: BoolArray) -> "_State":
-        """The other's values in some rows."""
-        return _State(
-            np.where(rows, other.changed, self.changed),
-            np.where(rows, other.bend, self.bend),
-            np.where(rows, other.clearances, self.clearances),
-        )
 
 
 def _runs(corners: Corners) -> list[tuple[int, int]]:
@@ -104,7 +87,7 @@ def _spans(corners: Corners, stride: int, phase: int) -> list[tuple[int, int]]:
     return spans
 
 
-def _allowed(state: _State, new: _State, span: tuple[int, int], drawn: bool) -> bool:
+def _allowed(state: Looks, new: Looks, span: tuple[int, int], drawn: bool) -> bool:
     """Whether a flattened span bends no more joints over its length than before."""
     a, b = span
     if not drawn:
@@ -119,8 +102,7 @@ def shortcut(judge: Judge, corners: Corners, weights: CostWeights) -> Corners:
     """
     longest = max(b - a for a, b in _runs(corners))
     stride = 1 << max(1, int(np.ceil(np.log2(max(longest, 2)))))
-    clearances, changed, bend = judge.look(corners.tips, corners.offsets)
-    state = _State(changed, bend, clearances)
+    state = judge.look(corners.tips, corners.offsets)
     while stride >= 2:
         for phase in (0, stride // 2):
             spans = _spans(corners, stride, phase)
@@ -133,10 +115,10 @@ def shortcut(judge: Judge, corners: Corners, weights: CostWeights) -> Corners:
 def _round(
     judge: Judge,
     corners: Corners,
-    state: _State,
+    state: Looks,
     weights: CostWeights,
     spans: list[tuple[int, int]],
-) -> tuple[Corners, _State]:
+) -> tuple[Corners, Looks]:
     trial = _flattened(judge, corners, spans)
     gap = np.abs(trial.offsets - corners.offsets).max(axis=(1, 2))
     gap = np.maximum(gap, np.abs(trial.tips - corners.tips).max(axis=1))
@@ -145,10 +127,10 @@ def _round(
     if not spans:
         return corners, state
     picked = np.concatenate([np.arange(a, b) for a, b in spans])
-    new = _State(state.changed.copy(), state.bend.copy(), state.clearances.copy())
+    new = Looks(*(values.copy() for values in state))
     bends = judge.bends(trial.tips[picked], trial.offsets[picked])
     new.changed[picked] = (bends > TOLERANCES.changed_angle).sum(axis=1)
-    new.bend[picked] = bends.max(axis=1)
+    new.largest[picked] = bends.max(axis=1)
     need, bend = _guards(judge, corners, state, weights, spans)
     good, new.clearances[picked] = judge.measured(
         judge.lines(trial, picked), need, bend
@@ -164,13 +146,14 @@ def _round(
             kept.append(span)
             taken[a + 1 : b] = True
         place += b - a
-    return _flattened(judge, corners, kept), state.taken(new, taken)
+    state = Looks(*(np.where(taken, *both) for both in zip(new, state, strict=True)))
+    return _flattened(judge, corners, kept), state
 
 
 def _guards(
     judge: Judge,
     corners: Corners,
-    state: _State,
+    state: Looks,
     weights: CostWeights,
     spans: list[tuple[int, int]],
 ) -> tuple[FloatArray, FloatArray]:
@@ -180,7 +163,7 @@ def _guards(
     for a, b in spans:
         clearances = float(state.clearances[a : b + 1].min())
         clearances = max(min(clearances, judge.required + wanted / 2.0), judge.required)
-        most = max(float(state.bend[a : b + 1].max()), weights.easy_bend)
+        most = max(float(state.largest[a : b + 1].max()), weights.easy_bend)
         need += [clearances] * (b - a)
         bend += [most] * (b - a)
     return np.array(need), np.array(bend)

@@ -78,9 +78,8 @@ def _without(judge: Judge, corners: Corners, joint: int, way: int) -> Corners:
     trial[rows] = in_line(arm, tips[rows], trial[rows], joint, way)
     after = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
     rows = rows[after.sum(axis=1) < before]
-    clearances, _, _ = judge.look(tips[rows], trial[rows])
     better = np.zeros(len(on), dtype=np.bool_)
-    better[rows] = clearances >= judge.required
+    better[rows] = judge.look(tips[rows], trial[rows]).clearances >= judge.required
     asked = better
     while better.any():
         offsets = np.where(better[:, None, None], trial, corners.offsets)

@@ -60,7 +60,7 @@ def with_start(
         return roadmap, int(roadmap.index[0])
     tip = roadmap.route.tips[:1]
     offsets = checked_start(judge, tip, directed=False)[None]
-    clearances, _, _ = judge.look(tip, offsets)
+    clearances = judge.look(tip, offsets).clearances
     shapes = roadmap.shapes
     nodes = roadmap.nodes_at(0)
     _, around = roadmap.poses_of(judge.problem.manipulator, nodes)
@@ -79,10 +79,8 @@ def with_start(
     there = roadmap.shapes_of(nodes[near[good]])
     turn = gap[near[good]] / (TURN * judge.problem.manipulator.total_length)
     links = np.column_stack([ids, there, turn])
-    more = extended(
-        roadmap, judge.pricing(weights), np.zeros(1, dtype=np.int64),
-        judge.bends(tip, offsets), clearances, shapes.with_grown(offsets, links),
-    )  # fmt: skip
+    at, grown = np.zeros(1, dtype=np.int64), shapes.with_grown(offsets, links)
+    more = extended(roadmap, judge, weights, at, offsets, clearances, grown)
     return more, int(more.index[shapes.size])
 
 
