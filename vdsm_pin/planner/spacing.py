@@ -3,8 +3,7 @@
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.compiled import compiled
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -65,30 +64,8 @@ def row_steps(
     Returns:
         Largest change of a joint angle [rad] and M / 8 [m], (n_samples - 1,) each.
     """
-    steps = np.zeros((2, max(len(alpha) - 1, 0)))
-    rows = read_only(alpha), read_only(theta)
-    _row_steps(*rows, manipulator.link_lengths, steps)
-    return steps[0], steps[1]
-
-
-@compiled
-def _row_steps(
-    alpha: FloatArray, theta: FloatArray, lengths: FloatArray, steps: FloatArray
-) -> None:
-    """What `row_steps` returns.
-
-    Args:
-        alpha: Yaw angles, shape (n_samples, N); [rad].
-        theta: Pitch angles, shape (n_samples, N); [rad].
-        lengths: Of the links, shape (N,); [m].
-        steps: Set to the largest changes [rad] and the strays [m], (2, n_samples - 1).
-    """
-    for k in range(steps.shape[1]):
-        largest = turning = bound = 0.0
-        for i in range(lengths.size):
-            yaw = abs(alpha[k + 1, i] - alpha[k, i])
-            pitch = abs(theta[k + 1, i] - theta[k, i])
-            largest = max(largest, yaw, pitch)
-            turning += yaw + pitch
-            bound += turning * turning * lengths[i]
-        steps[0, k], steps[1, k] = largest, bound / 8.0
+    yaw, pitch = np.abs(np.diff(alpha, axis=0)), np.abs(np.diff(theta, axis=0))
+    largest = np.maximum(yaw, pitch).max(axis=1)
+    turning = np.cumsum(yaw + pitch, axis=1)
+    bounds = np.cumsum(turning * turning * manipulator.link_lengths, axis=1)
+    return largest, bounds[:, -1] / 8.0

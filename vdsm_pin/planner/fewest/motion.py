@@ -26,8 +26,6 @@ from vdsm_pin.planner.fewest.pose_kernels import (
     centres_between,
     knees_between,
 )
-from vdsm_pin.planner.fewest.roadmap import Roadmap
-from vdsm_pin.planner.fewest.sequence import Sequence
 from vdsm_pin.planner.spacing import count_of, row_steps, spread
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -172,26 +170,6 @@ def standing(
     number = np.arange(len(tips))
     still = Intervals(tips, tips, offsets, offsets)
     return still.centres(manipulator, number, np.zeros(len(tips)))
-
-
-def motion_corners(
-    manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence
-) -> Corners:
-    """The corners of a sequence; a leg begins where the one before ends."""
-    nodes: list[int] = []
-    stations: list[float] = []
-    drawn: list[bool] = []
-    for leg in sequence.legs:
-        again = 1 if nodes else 0
-        nodes += leg.nodes[again:]
-        stations += [roadmap.route.stations[k] for k in leg.layers[again:]]
-        drawn += [leg.drawn] * (len(leg.nodes) - 1)
-    number = np.array(nodes)
-    tips, offsets = roadmap.poses_of(manipulator, number)
-    edges = np.stack([number[:-1], number[1:]], axis=1)
-    return Corners(
-        tips, offsets, np.array(stations), np.array(drawn, dtype=np.bool_), edges
-    )
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Corners, motion_corners
+from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.route import TipRoute
-from vdsm_pin.planner.fewest.sequence import Planner, reordered
+from vdsm_pin.planner.fewest.sequence import Planner, Sequence, reordered
 from vdsm_pin.problem.desired_path import Order
 
 
@@ -73,7 +74,7 @@ def search(
             return None
         if judge.problem.path.order is Order.FREE:
             sequence = reordered(planner, sequence)
-        corners = motion_corners(arm, roadmap, sequence)
+        corners = _corners(arm, roadmap, sequence)
         fresh = _fresh(corners.edges, known)
         good = (
             judge.clear(judge.lines(corners, fresh)) if fresh.size else np.ones(0, bool)
@@ -87,6 +88,24 @@ def search(
         known.update(_keys(corners.edges[fresh]))
         planner.block(corners.edges[bad], not corners.drawn[bad].all())
     return None
+
+
+def _corners(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> Corners:
+    """The corners of a sequence; a leg begins where the one before ends."""
+    nodes: list[int] = []
+    stations: list[float] = []
+    drawn: list[bool] = []
+    for leg in sequence.legs:
+        again = 1 if nodes else 0
+        nodes += leg.nodes[again:]
+        stations += [roadmap.route.stations[k] for k in leg.layers[again:]]
+        drawn += [leg.drawn] * (len(leg.nodes) - 1)
+    number = np.array(nodes)
+    tips, offsets = roadmap.poses_of(manipulator, number)
+    edges = np.stack([number[:-1], number[1:]], axis=1)
+    return Corners(
+        tips, offsets, np.array(stations), np.array(drawn, dtype=np.bool_), edges
+    )
 
 
 def _fresh(edges: IntArray, known: set[tuple[int, int]]) -> IntArray:
