@@ -48,7 +48,7 @@ class Parts(NamedTuple):
 
     def take(self, kept: BoolArray) -> "Parts":
         """Some of the parts."""
-        return Parts(*(values[kept] for values in self))
+        return Parts._make(values[kept] for values in self)
 
     def cut(self, inner: Inner, centres: FloatArray, clearances: FloatArray) -> "Parts":
         """The parts between the places, every place of each part in order."""

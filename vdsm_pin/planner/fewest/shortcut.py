@@ -127,7 +127,7 @@ def _round(
     if not spans:
         return corners, state
     picked = np.concatenate([np.arange(a, b) for a, b in spans])
-    new = Looks(*(values.copy() for values in state))
+    new = Looks._make(values.copy() for values in state)
     bends = judge.bends(trial.tips[picked], trial.offsets[picked])
     new.changed[picked] = (bends > TOLERANCES.changed_angle).sum(axis=1)
     new.largest[picked] = bends.max(axis=1)
@@ -146,7 +146,7 @@ def _round(
             kept.append(span)
             taken[a + 1 : b] = True
         place += b - a
-    state = Looks(*(np.where(taken, *both) for both in zip(new, state, strict=True)))
+    state = Looks._make(np.where(taken, *both) for both in zip(new, state, strict=True))
     return _flattened(judge, corners, kept), state
 
 
