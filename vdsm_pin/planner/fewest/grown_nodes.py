@@ -49,8 +49,8 @@ def tied_in(
     links.append(_ties(judge, roadmap, places, every))
     positions = route.tips[places]
     clearances = judge.look(positions, every).clearances
-    more = shapes.with_grown(every, np.vstack(links))
-    return extended(roadmap, judge, weights, places, every, clearances, more)
+    wider = shapes.with_grown(every, np.vstack(links))
+    return extended(roadmap, judge, weights, places, every, clearances, wider)
 
 
 TIES = 4
