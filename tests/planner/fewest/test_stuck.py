@@ -91,7 +91,7 @@ def test_what_the_path_itself_lacks_is_named() -> None:
     told = on_the_path(task, tips, room + 1e-4)
     assert told is not None
     assert f"leaves the tip itself {room * 1e3:.3f} mm to 'wall3'" in told.words
-    assert (told.link, told.obstacle, told.station) == (8, "wall3", 0.2)
+    assert (told.link, told.obstacle) == (8, "wall3")
     assert on_the_path(task, tips, room - 1e-4) is None
     assert at_reach(task, tips) is None
     short = replace(task.manipulator, base_range=(-5.0, 0.7 - 3.126))
