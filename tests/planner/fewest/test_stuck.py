@@ -13,11 +13,15 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
-from vdsm_pin.planner.fewest.explain import minimal, refuse
-from vdsm_pin.planner.fewest.explore import explore
+from vdsm_pin.planner.fewest.explain import how_far, minimal, refuse
+from vdsm_pin.planner.fewest.explore import Outcome, explore
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Effort, Insert
+from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.narrow_passage import narrowest_passage
 from vdsm_pin.planner.fewest.roadmap import CostWeights
+from vdsm_pin.planner.fewest.route import path_rows, tip_route
+from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import (
     Stuck,
@@ -29,14 +33,17 @@ from vdsm_pin.planner.fewest.stuck import (
     too_narrow,
     where_stuck,
 )
+from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.progress import shown
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance
 
 HALF = 0.08
+ENDS = np.zeros((0, 2), dtype=np.int64)
 
 
 def wall(x: float, half: float) -> list[Obstacle]:
@@ -98,6 +105,25 @@ def test_what_the_path_itself_lacks_is_named() -> None:
     told = at_reach(replace(task, manipulator=short), tips)
     assert told is not None
     assert "longer rail" in told.words
+
+
+def test_a_stop_is_told_with_the_station_where_it_was() -> None:
+    """All of a path but its last stretch is drawn, and no cause is seen there."""
+    task = behind(HALF)
+    clearance, rows = broad_phase(task, link_clearance(task)), path_rows(task.path)
+    proof = prove_tips(task, clearance, rows.tips)
+    route = tip_route(task, rows, proof.closed, 0.02, 0.0)
+    still = np.zeros((0, 9, 2))
+    corners = Corners(np.zeros((0, 3)), still, np.zeros(0), proof.far[:0], ENDS)
+    found = Found(route, corners, (len(route.layers) - 1,))
+    judge = Judge(task, clearance, 0.0, 0.0, 1e-3)
+    told = how_far(task, Outcome(judge, found, rows, proof), Deadline(1.0, 0.0))
+    assert told.station == route.stations[-2] > 0.0
+    at = in_mm(told.station)
+    assert told.words.startswith(
+        f"drew {at} of 100.000 mm; the first stretch not drawn begins at {at} along "
+        "the path, tip (1400.0, 0.0, 100.0) mm; link "
+    )
 
 
 def test_an_opening_too_narrow_for_the_tip_is_named() -> None:
