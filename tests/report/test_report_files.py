@@ -124,6 +124,32 @@ def test_motion_facts_follow_the_rows() -> None:
     assert (motion.x0_min_m, motion.x0_max_m) == (rows.x0.min(), rows.x0.max())
 
 
+def test_motion_facts_hold_what_lies_between_rows() -> None:
+    """Of a cubic piece between equal values a parabola, v h / 4 high: closed form."""
+    rates = np.zeros((2, 17))
+    rates[:, 0], rates[:, 5] = (0.8, -0.8), (-0.4, 0.4)
+    none, flat = np.zeros(2), np.zeros((2, 8))
+    times = np.array([0.0, 1.0])
+    rows = Trajectory(none, none, none, flat, flat, times=times, rates=rates)
+    facts = motion_facts(made_up.problem(), rows)
+    assert (facts.x0_min_m, facts.x0_max_m) == pytest.approx((0.0, 0.2))
+    expected = 0.1 * np.eye(8)[2]
+    np.testing.assert_allclose(facts.max_link_angle_rad, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_long_ways_count_in_the_mean_of_an_open_path(share: float) -> None:
+    """One changed angle up to a place, from there to the end up to three."""
+    alpha = np.zeros((3, 8))
+    alpha[:, 0] = alpha[2, 1:3] = 0.1
+    closed, on = made_up.problem(), np.ones(3)
+    problem = replace(closed, tip_path=replace(closed.path, closed=False))
+    along = problem.path.length * np.array([0.0, share, 1.0])
+    rows = Trajectory(on, along, np.zeros(3), alpha, np.zeros((3, 8)))
+    mean = motion_facts(problem, rows).changed_angles_mean_on_path
+    assert mean == pytest.approx(share * 1 + (1 - share) * 2)
+
+
 def test_links_near_each_other_do_not_hide_the_obstacles() -> None:
     judged = made_up.verification()
     near = replace(judged.approaches[0], pair=Pair(1, other_link=3), lower=0.001)

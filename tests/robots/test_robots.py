@@ -15,6 +15,7 @@ from vdsm_pin.geometry.solids import Cylinder, HalfSpace, Sphere
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
+from vdsm_pin.report.robot_facts import reached
 from vdsm_pin.robots.cell import Cell, cell_of, read_cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
@@ -328,6 +329,24 @@ def test_limits_of_a_mimic_that_cannot_be_kept_are_noted(
         slide = robot.joints[1]
         assert (slide.lower, slide.upper) == (-0.1, 0.4)
         assert slide.velocity == (1.0 if 'r="0"' in change else 0.5)
+
+
+def test_a_joint_without_room_of_its_own_is_left_none_by_no_mimic(
+    tmp_path: Path,
+) -> None:
+    """Limits of equal ends; those of the mimic hold them, and are kept."""
+    text = URDF.replace('lower="-0.1" upper="0.4"', 'lower="0.2" upper="0.2"')
+    robot = read_robot(RobotFiles(write(tmp_path, "two.urdf", text)))
+    assert not [note for note in robot.notes if "not judged" in note]
+    slide = robot.joints[1]
+    assert (slide.lower, slide.upper, slide.velocity) == (0.2, 0.2, 0.5)
+
+
+def test_ranges_of_joints_hold_what_lies_between_rows() -> None:
+    """Of a cubic piece between equal values a parabola, v h / 4 high: closed form."""
+    rates = np.array([[0.8, -0.4], [-0.8, 0.4]])
+    path = Motion.through(np.zeros((2, 2)), np.array([0.0, 1.0]), rates)
+    np.testing.assert_allclose(reached(path), [[0.0, -0.1], [0.2, 0.0]], atol=1e-15)
 
 
 def test_planning_scenes_are_read_as_they_stand(tmp_path: Path) -> None:

@@ -66,6 +66,22 @@ def assert_judged(
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])
+def test_links_that_turn_past_a_right_angle_leave_their_cone(degree: int) -> None:
+    """Psi falls again there: 0 where alpha and theta are 180 deg, as at these rows."""
+    rng, left = np.random.default_rng(degree), 0
+    for _ in range(30):
+        motion = random_motion(rng, degree)
+        turned = rng.choice([0.0, np.pi, -np.pi], (2, motion.n_samples, 1, 1))
+        alpha, theta = turned[:, :, 0] + 0.1 * np.stack([motion.alpha, motion.theta])
+        motion = replace(motion, alpha=alpha, theta=theta)
+        psi = link_angles(*(dense(motion)[1][:, k::2] for k in (1, 2)))
+        if psi.max() > CONE + 2e-3:
+            left += 1
+            assert check_limits(PROBLEM, motion)[2].verdict is Verdict.REFUTED
+    assert left > 10
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
 def test_a_broken_limit_is_told_at_its_worst_of_all_parts(
     degree: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

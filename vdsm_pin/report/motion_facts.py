@@ -1,4 +1,4 @@
-"""What the arm does, measured at the waypoints."""
+"""What the arm does over a motion."""
 
 from typing import Final
 
@@ -10,6 +10,8 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.rows import MotionFacts
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.drawing import runs
+from vdsm_pin.verification.extremes import rows_along
 
 _CHUNK: Final = 65_536  # rows treated at once, so that memory stays bounded
 
@@ -24,38 +26,41 @@ def changed_angles(psi: FloatArray) -> IntArray:
 
 
 def motion_facts(problem: PlanningProblem, trajectory: Trajectory) -> MotionFacts:
-    """Extremes over the rows of a trajectory."""
-    largest = np.zeros(trajectory.n_links)
+    """Extremes over a motion; changed link angles at its rows."""
+    largest, x0 = np.zeros(trajectory.n_links), [np.inf, -np.inf]
+    for rows in rows_along(trajectory.path):
+        psi = link_angles(rows[:, 1::2], rows[:, 2::2])
+        largest = np.maximum(largest, psi.max(axis=0))
+        x0 = [min(x0[0], rows[:, 0].min()), max(x0[1], rows[:, 0].max())]
     changed = np.zeros(trajectory.n_samples, dtype=np.int64)
     for first in range(0, trajectory.n_samples, _CHUNK):
         part = slice(first, first + _CHUNK)
         psi = link_angles(trajectory.alpha[part], trajectory.theta[part])
-        largest = np.maximum(largest, psi.max(axis=0))
         changed[part] = changed_angles(psi)
     on_path = changed[trajectory.on_path & (problem.tip_path is not None)]
-    mean = _mean_by_way(changed, trajectory) if on_path.size else None
+    mean = _mean_by_way(changed, problem, trajectory) if on_path.size else None
     return MotionFacts(
         waypoints=trajectory.n_samples,
         on_path_waypoints=None if problem.tip_path is None else int(on_path.size),
         max_link_angle_rad=tuple(float(value) for value in largest),
-        x0_min_m=float(trajectory.x0.min()),
-        x0_max_m=float(trajectory.x0.max()),
+        x0_min_m=float(x0[0]),
+        x0_max_m=float(x0[1]),
         changed_angle_threshold_rad=TOLERANCES.changed_angle,
         changed_angles_mean_on_path=mean,
         changed_angles_max=int(changed.max()),
     )
 
 
-def _mean_by_way(values: IntArray, trajectory: Trajectory) -> float:
+def _mean_by_way(
+    values: IntArray, problem: PlanningProblem, trajectory: Trajectory
+) -> float:
     """Mean over the length of the drawn path, whatever the distance of the rows.
 
     Between two rows half the way counts for each; where nothing is drawn between rows
     all count alike.
     """
-    on, along = trajectory.on_path, trajectory.path_m
-    ways = np.abs(np.diff(along)) * (on[1:] & on[:-1])
-    # A closed path goes on from its length to 0.
-    ways[ways > np.ptp(along) / 2.0] = 0.0
+    on = trajectory.on_path
+    ways = np.abs(runs(problem.path, trajectory.path_m)) * (on[1:] & on[:-1])
     if not ways.any():
         return float(values[on].mean())
     return float(ways @ (values[1:] + values[:-1]) / (2.0 * ways.sum()))

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.paths import Path
@@ -12,6 +14,7 @@ from vdsm_pin.report.words import finite
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.robots.model import Robot, RobotJoint
+from vdsm_pin.verification.extremes import rows_along
 from vdsm_pin.verification.inside import mesh_notes
 
 
@@ -50,7 +53,7 @@ def _motion(cell: Cell, path: Path) -> RobotFacts:
     robot = cell.robot
     rows = (
         _joint(joint, values)
-        for joint, values in zip(robot.joints, path.knots.T, strict=True)
+        for joint, values in zip(robot.joints, reached(path).T, strict=True)
     )
     return RobotFacts.model_validate(
         {
@@ -64,8 +67,15 @@ def _motion(cell: Cell, path: Path) -> RobotFacts:
     )
 
 
+def reached(path: Path) -> FloatArray:
+    """Least and largest values of all columns over a motion, (2, n_columns)."""
+    ends = [(rows.min(axis=0), rows.max(axis=0)) for rows in rows_along(path)]
+    low, high = np.swapaxes(ends, 0, 1)
+    return np.stack([low.min(axis=0), high.max(axis=0)])
+
+
 def _joint(joint: RobotJoint, values: FloatArray) -> JointRow:
-    reached = float(values.min()), float(values.max())
+    reached = float(values[0]), float(values[1])
     limits = finite(joint.lower), finite(joint.upper)
     if joint.turns:
         return JointRow(name=joint.name, range_rad=reached, limits_rad=limits)

@@ -234,7 +234,7 @@ class ToleranceRow(FileModel):
 
 
 class MotionFacts(FileModel):
-    """What the arm does, measured at the waypoints."""
+    """What the arm does over the motion; changed link angles at the waypoints."""
 
     waypoints: int = Field(description="rows of the trajectory")
     on_path_waypoints: int | None = Field(
@@ -255,7 +255,7 @@ class MotionFacts(FileModel):
 
 
 class JointRow(FileModel):
-    """One joint of a robot and where it goes at the waypoints."""
+    """One joint of a robot and where it goes over the motion."""
 
     name: str = Field(description="as in the URDF")
     range_rad: Range | None = Field(
@@ -273,7 +273,7 @@ class JointRow(FileModel):
 
 
 class RobotFacts(FileModel):
-    """What a robot of a URDF does, measured at the waypoints."""
+    """What a robot of a URDF does over the motion."""
 
     waypoints: int = Field(description="rows of the trajectory")
     robot: str = Field(description="its name in the URDF")

@@ -100,7 +100,9 @@ def narrowed(
         if column is not None and ratio:
             joint = held[column]
             found = held[column] = _narrower(joint, name, limits, value)
-            kept = found.upper - found.lower > TOLERANCES.arithmetic
+            ends = (found.lower, found.upper), (joint.lower, joint.upper)
+            room = found.upper - found.lower > TOLERANCES.arithmetic
+            kept = room or ends[0] == ends[1]
             why = f"they leave joint {joint.name!r}, which it mimics, no room"
             if not kept:
                 rates = replace(limits, lower=-np.inf, upper=np.inf)

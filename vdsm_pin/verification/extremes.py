@@ -89,6 +89,24 @@ def pieces_of(path: Path) -> Iterator[tuple[int, FloatArray]]:
         yield first, path.pieces(numbers)
 
 
+def cut(controls: FloatArray) -> FloatArray:
+    """Control points of all parts of some pieces, one piece after the other."""
+    edges = np.tile(np.arange(PARTS), len(controls)) / PARTS
+    return part(np.repeat(controls, PARTS, axis=0), edges, edges + 1.0 / PARTS)
+
+
+def rows_along(path: Path) -> Iterator[FloatArray]:
+    """Rows all along a motion: those of straight lines, and of parts of smooth pieces.
+
+    Shape (m, n_columns) each; the least and the largest of them are those of the motion
+    to a thousandth of a bulge.
+    """
+    for _, controls in pieces_of(path):
+        smooth = controls.shape[1] > 1
+        yield cut(controls)[:, 0] if smooth else controls[:, 0]
+    yield path.knots[-1:]
+
+
 def largest(pieces: Pieces, measure: Measure, limit: float) -> Largest:
     """Largest value of a measure over a motion.
 

@@ -14,7 +14,6 @@ import numpy as np
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.bernstein import part
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
@@ -24,6 +23,7 @@ from vdsm_pin.verification.extremes import (
     CHUNK,
     PARTS,
     Largest,
+    cut,
     largest,
     pieces_of,
     range_check,
@@ -31,6 +31,7 @@ from vdsm_pin.verification.extremes import (
 from vdsm_pin.verification.records import Check, Verdict
 
 RAIL: Final = "base on its rail"
+RIGHT_ANGLE: Final = np.pi / 2.0
 CHANGE: Final = "change of a joint angle between waypoints"
 
 
@@ -46,19 +47,13 @@ def _largest_change(path: Path) -> Largest:
         controls = path.pieces(numbers)[:, :, 1:]
         wide = np.ptp(controls, axis=1).max(axis=1) > found.seen
         if wide.any():
-            fine = _cut(controls[wide]).reshape(
+            fine = cut(controls[wide]).reshape(
                 int(wide.sum()), PARTS, -1, ends.shape[1]
             )
             found = found.bounded(np.ptp(fine, axis=(1, 2)))
             edges = np.concatenate([fine[:, :, 0], fine[:, -1:, -1]], axis=1)
             found = found.larger(np.ptp(edges, axis=1), numbers[wide])
     return found
-
-
-def _cut(controls: FloatArray) -> FloatArray:
-    """Control points of all parts of some pieces, one piece after the other."""
-    edges = np.tile(np.arange(PARTS), len(controls)) / PARTS
-    return part(np.repeat(controls, PARTS, axis=0), edges, edges + 1.0 / PARTS)
 
 
 def _alpha(joints: FloatArray) -> FloatArray:
@@ -70,7 +65,16 @@ def _theta(joints: FloatArray) -> FloatArray:
 
 
 def _psi(joints: FloatArray) -> FloatArray:
-    return link_angles(joints[:, 1::2], joints[:, 2::2])
+    """Link angles; where alpha or theta is past 90 deg, one of 90 deg lies on the way.
+
+    Beyond, psi falls again: 0 where both are 180 deg.
+    """
+    alpha, theta = joints[:, 1::2], joints[:, 2::2]
+    found = link_angles(alpha, theta)
+    if np.abs(joints[:, 1:]).max(initial=0.0) > RIGHT_ANGLE:
+        nearer = (np.minimum(np.abs(one), RIGHT_ANGLE) for one in (alpha, theta))
+        found = np.maximum(found, link_angles(*nearer))
+    return found
 
 
 def _angle_check(
