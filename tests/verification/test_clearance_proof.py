@@ -14,6 +14,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.facts import min_clearance
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.inside import check_inside, locate_start
@@ -245,3 +246,29 @@ def test_a_mesh_said_to_be_a_surface_is_judged_as_one_and_the_row_says_so() -> N
     clearance = rows["clearance from obstacles"]
     assert clearance.verdict is Verdict.CERTIFIED
     assert "'cube' as a surface only" in clearance.where
+
+
+def test_the_least_clearance_under_errors_is_that_of_every_pair() -> None:
+    """Twelve posts by link 1, and one that the tip alone comes near where joints err.
+
+    Oracle: the plane arm with all yaws off by their errors, by its own sums.
+    """
+    posts = [
+        Sphere(f"{k}", np.array([0.2 + 0.02 * k, 0.3, 0.0]), 0.05) for k in range(12)
+    ]
+    far, error = Sphere("far", np.array([3.1, 0.345, 0.0]), 0.05), np.deg2rad(0.5)
+    problem = replace(problem_with(*posts, far, required=0.01), tip_path=None)
+    none = np.zeros((2, 8))
+    rows = trajectory(np.array([0.0, 1e-3]), none, none)
+    result = verify(problem.under(ErrorBox(joint=error)), rows)
+    turned = error * np.arange(1.0, 9.0)
+    tip = np.array([np.cos(turned), np.sin(turned)]) @ ARM.link_lengths
+    met = np.linalg.norm(tip - far.centre[:2]) - far.radius - ARM.link_radius
+    assert result.verdict is Verdict.CERTIFIED
+    assert 0.1 < result.min_clearance <= met < 0.13
+    told = [near.lower for near in result.approaches if near.pair.obstacle == "far"]
+    assert told == [result.min_clearance]
+    assert len(result.approaches) == 10
+    told_of = min_clearance(result)
+    assert told_of and (told_of.link, told_of.obstacle) == (8, "far")
+    assert told_of.lower_m == result.min_clearance

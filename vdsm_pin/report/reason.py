@@ -10,6 +10,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.rows import LeftOutRow
 from vdsm_pin.report.words import at_least, depth, finite, percent, place, quantity
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.inside import ARM_OUTSIDE, LINKS_OUTSIDE, surfaces
 from vdsm_pin.verification.records import (
     ArmVerification,
@@ -23,9 +24,18 @@ _PASSED: Final = Verdict.CERTIFIED
 
 
 def nearest_to_obstacle(verification: Verification) -> int | None:
-    """Index of the closest approach to an obstacle; None without obstacles."""
-    near = (i for i, row in enumerate(verification.approaches) if row.pair.obstacle)
-    return next(near, None)
+    """Index of the closest approach to an obstacle; None without obstacles.
+
+    Under errors that is the one proved to keep the least, unless the nearest is found
+    to be too near.
+    """
+    rows = verification.approaches
+    near = [i for i, row in enumerate(rows) if row.pair.obstacle]
+    if not near or rows[near[0]].upper < verification.problem.required_clearance:
+        return near[0] if near else None
+    weakest, gap = min(near, key=lambda i: rows[i].lower), TOLERANCES.least_bracket
+    weaker = rows[weakest].lower < rows[near[0]].lower - 2.0 * gap
+    return weakest if weaker else near[0]
 
 
 def failing(verification: Verification) -> tuple[Check, ...]:

@@ -8,8 +8,10 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.records import ClosestApproach, Pair, is_deepest
 from vdsm_pin.verification.task import ball_of
@@ -50,13 +52,25 @@ def nearest_pairs(
 ) -> dict[int, ClosestApproach]:
     """The pairs of least upper bounds by their numbers, obstacles first.
 
+    Under errors one that comes less near may be proved to keep less than any of these
+    from its obstacle; then it takes the place of the last.
+
     Args:
         pairs: Every pair, of an arm or a robot.
         least: What is proved of them.
     """
     of_links = np.array([not pair.obstacle for pair in pairs], bool)
     seen = np.flatnonzero(np.isfinite(least.upper))
-    order = seen[np.lexsort((least.upper[seen], of_links[seen]))][:CLOSEST]
+
+    def nearest(some: IntArray) -> IntArray:
+        return some[np.lexsort((least.upper[some], of_links[some]))][:CLOSEST]
+
+    order = nearest(seen)
+    lower = np.where(of_links, np.inf, least.lower)[seen]
+    least_of_all = lower.min(initial=np.inf) + 2.0 * TOLERANCES.least_bracket
+    if order.size and (least.lower[order] > least_of_all).all():
+        weakest = seen[np.argmin(lower)]
+        order = nearest(np.append(order[: CLOSEST - 1], weakest))
     return {
         k: ClosestApproach(
             interval=int(least.interval[k]),

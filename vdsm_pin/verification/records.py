@@ -252,9 +252,13 @@ class Verification(Summarised):
 
     @property
     def min_clearance(self) -> float:
-        """Proved least clearance from any obstacle, infinite without obstacles; [m]."""
-        near = (one.lower for one in self.approaches if one.pair.obstacle)
-        return min(near, default=inf)
+        """Proved least clearance from any obstacle, infinite without obstacles; [m].
+
+        Of every pair: under errors one may be proved to keep less than all that come
+        nearest without them.
+        """
+        outer = np.array([bool(pair.obstacle) for pair in self.pairs], bool)
+        return float(self.least.lower[outer].min(initial=inf))
 
     def time_at(self, moment: float) -> float | None:
         """When a moment in waypoints is, where the trajectory tells; [s]."""
