@@ -8,7 +8,7 @@ import pytest
 
 from tests.robots.test_robots import CELL, URDF, mutated, write
 from vdsm_pin.errors import InvalidFile, VdsmError
-from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Mesh, Sphere
 from vdsm_pin.robots import mjcf_size
 from vdsm_pin.robots.cell import cell_of, read_cell
 from vdsm_pin.robots.files import RobotFiles
@@ -283,3 +283,22 @@ def test_whole_numbers_of_any_size_are_refused(tmp_path: Path) -> None:
     text += ", primitives: [], primitive_poses: []}]}"
     with pytest.raises(InvalidFile, match="expected 3 finite numbers"):
         read_scene(write(tmp_path, "m.yaml", text), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("size", "noted"), [(31.0, True), (29.0, False), (0.0034, False), (0.0032, True)]
+)
+def test_meshes_of_a_planning_scene_in_another_unit_are_noted(
+    tmp_path: Path, size: float, noted: bool
+) -> None:
+    """Beside a robot of 1 m: more than 30 times as large, or 300 times smaller."""
+    corners = [[0, 0, 0], [size, 0, 0], [size / 2, size / 9, 0], [0, 0, size / 9]]
+    text = (
+        "world:\n  collision_objects:\n    - id: part\n"
+        "      mesh_poses: [{position: [1, 0, 0], orientation: [0, 0, 0, 1]}]\n"
+        f"      meshes: [{{vertices: {corners}, triangles: [[0, 1, 3], [0, 2, 1]]}}]\n"
+    )
+    (mesh,) = read_scene(write(tmp_path, "s.yaml", text), 1.0).obstacles
+    assert isinstance(mesh, Mesh)
+    assert len(mesh.notes) == noted
+    assert all("is it in another unit?" in note for note in mesh.notes)

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
@@ -70,10 +71,10 @@ def read_scene_with_files(
         return world, tuple((f"{path.name} includes", one) for one in included)
     text = read_text(path, limit=MAX_BYTES)
     if kind == ".scene":
-        return _moveit(read_scene_text(path, text), links), ()
+        return _moveit(read_scene_text(path, text), links, robot_size), ()
     document = read_yaml(text, file=path)
     if isinstance(document.data, dict) and "world" in document.data:
-        return _moveit(document, links), ()
+        return _moveit(document, links, robot_size), ()
     return _ours(document, path, robot_size)
 
 
@@ -88,7 +89,7 @@ def _ours(
     return scene, files_of_obstacles(model.obstacles, path.parent)
 
 
-def _moveit(document: YamlDocument, links: Collection[str]) -> Scene:
+def _moveit(document: YamlDocument, links: Collection[str], robot_size: float) -> Scene:
     """The collision objects of a PlanningScene, all solids of one as one obstacle each.
 
     Its allowed collision matrix is not read: the SRDF says which links may touch.
@@ -108,9 +109,22 @@ def _moveit(document: YamlDocument, links: Collection[str]) -> Scene:
     things = whole["world"].get("collision_objects", []).items()
     _check_frames(things, links)
     for thing in things:
-        found += _solids(thing)
+        found += [_sized(one, robot_size) for one in _solids(thing)]
     with whole["world"].naming():
         return Scene(tuple(found))
+
+
+def _sized(obstacle: Obstacle, robot_size: float) -> Obstacle:
+    """An obstacle, a mesh with a note where its size is that of another unit."""
+    if not isinstance(obstacle, Mesh):
+        return obstacle
+    size = float(np.linalg.norm(np.ptp(obstacle.vertices, axis=0)))
+    low, high = TOLERANCES.mesh_size_low, TOLERANCES.mesh_size_high
+    if low * robot_size <= size <= high * robot_size:
+        return obstacle
+    note = f"is {size:.3g} m large beside a robot of {robot_size:.3g} m, as a "
+    note += "PlanningScene has it, in metres; is it in another unit?"
+    return replace(obstacle, notes=(*obstacle.notes, note))
 
 
 def _check_frames(things: Sequence[Place], links: Collection[str]) -> None:
