@@ -62,7 +62,9 @@ def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
         CutOff: No way leads to too much of the path.
     """
     rows, proof = outcome.rows, outcome.proof
-    shut = _length(rows, _either_end(proof.closed))
+    # Of a stretch that is shut both ends are closed.
+    both = proof.closed[:-1] & proof.closed[1:]
+    shut = float(np.diff(rows.stations)[both].sum())
     whole = problem.path.blocked is Blocked.FAIL
     if proof.closed.all() or (whole and shut > 0.0):
         raise _proved(problem, outcome)
@@ -92,15 +94,6 @@ def _drawn(problem: PlanningProblem, outcome: Outcome) -> float:
     skipped = outcome.found.skipped
     undrawn = sum(float(stations[k] - stations[k - 1]) for k in skipped)
     return problem.path.length - undrawn
-
-
-def _either_end(closed: BoolArray) -> BoolArray:
-    """Intervals with both ends closed, shape (r - 1,)."""
-    return np.asarray(closed[:-1] & closed[1:])
-
-
-def _length(rows: PathRows, picked: BoolArray) -> float:
-    return float(np.diff(rows.stations)[picked].sum())
 
 
 def _proved(problem: PlanningProblem, outcome: Outcome) -> Infeasible:

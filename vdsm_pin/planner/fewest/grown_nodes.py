@@ -1,6 +1,5 @@
 """Grown shapes tied into the graph, where stretches of the path are not drawn."""
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -134,7 +133,7 @@ def fill(
             layers = Layers(tips, np.zeros(len(tips)))
             tree = Population(judge, layers, rng, POPULATION).grow(offsets, kept=KEPT)
             if len(tree.layer) > len(nodes):
-                trees.append(replace(tree, layer=number[tree.layer]))
+                trees.append(tree._replace(layer=number[tree.layer]))
                 roots.append(nodes)
                 crossed = bool((trees[-1].layer == last).any())
     return tied_in(judge, roadmap, trees, roots, weights) if trees else None

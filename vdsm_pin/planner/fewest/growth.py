@@ -12,7 +12,7 @@ the first tries fail a part of the children follow their parent's own curve.
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -69,33 +69,23 @@ class Layers:
         return np.where(self.aim_weight[layer, None] >= 1.0, self.aims[layer], np.nan)
 
 
-@dataclass(frozen=True)
-class Grown:
-    """Arms, each reached from its parent, which stands before it.
-
-    Args:
-        layer: Layer of each, shape (g,).
-        tips: Shape (g, 3); [m].
-        offsets: Shape coordinates, shape (g, N + 1, 2) or (g, N, 3).
-        clearances: Shape (g,); [m].
-        parent: Number of the parent, -1 of a root, shape (g,).
-    """
+class Grown(NamedTuple):
+    """Arms, each reached from its parent, which stands before it."""
 
     layer: IntArray
-    tips: FloatArray
-    offsets: FloatArray
-    clearances: FloatArray
-    parent: IntArray
+    """Layer of each, shape (g,)."""
 
-    def joined(self, other: "Grown") -> "Grown":
-        """These arms, and others whose parents are numbered among all."""
-        return Grown(
-            np.append(self.layer, other.layer),
-            np.concatenate([self.tips, other.tips]),
-            np.concatenate([self.offsets, other.offsets]),
-            np.append(self.clearances, other.clearances),
-            np.append(self.parent, other.parent),
-        )
+    tips: FloatArray
+    """Shape (g, 3); [m]."""
+
+    offsets: FloatArray
+    """Shape coordinates, shape (g, N + 1, 2) or (g, N, 3)."""
+
+    clearances: FloatArray
+    """Shape (g,); [m]."""
+
+    parent: IntArray
+    """Number of the parent, -1 of a root, shape (g,)."""
 
     def with_ancestors(self, numbers: IntArray) -> "Grown":
         """Only these arms, all their ancestors and all roots, in order."""
@@ -107,10 +97,8 @@ class Grown:
                 at = int(self.parent[at])
         # The last entry is the parent's of a root.
         rank = np.append(np.cumsum(kept) - 1, -1)
-        return Grown(
-            self.layer[kept], self.tips[kept], self.offsets[kept],
-            self.clearances[kept], rank[self.parent[kept]],
-        )  # fmt: skip
+        arms = Grown._make(values[kept] for values in self)
+        return arms._replace(parent=rank[arms.parent])
 
 
 class Population:
@@ -172,19 +160,12 @@ class Population:
             backtracks += 1
         return self.grown.with_ancestors(self._best(farthest, kept))
 
-    def _recorded(
-        self,
-        layer: IntArray,
-        tips: FloatArray,
-        offsets: FloatArray,
-        clearances: FloatArray,
-        parent: IntArray,
-    ) -> IntArray:
+    def _recorded(self, born: Grown) -> IntArray:
         """Numbers of arms after they are put on record."""
         before = len(self.grown.layer)
-        born = Grown(layer, tips, offsets, clearances, parent)
-        self.grown = self.grown.joined(born)
-        return before + np.arange(len(layer))
+        both = zip(self.grown, born, strict=True)
+        self.grown = Grown._make(np.concatenate(one) for one in both)
+        return before + np.arange(len(born.layer))
 
     def _leader(self) -> IntArray:
         """The arm that follows the tip's route, layer by layer as far as it is clear.
@@ -209,7 +190,7 @@ class Population:
         good = (clearances[1:] >= judge.required) & judge.clear(lines, need)
         on = layer[1:][np.logical_and.accumulate(good)]
         # Nobody else is on record yet but the root.
-        self._recorded(on, tips[on], offsets[on], clearances[on], on - 1)
+        self._recorded(Grown(on, tips[on], offsets[on], clearances[on], on - 1))
         return np.append(0, on)
 
     def _next(self, layer: int, generation: IntArray) -> IntArray:
@@ -247,10 +228,10 @@ class Population:
         # The start may be closer than the margin asks for.
         need = np.minimum(required, self.grown.clearances[parents])
         good = self.judge.clear(lines, need)
+        layers, clearances = np.full(int(good.sum()), to), clearances[picked]
         return self._recorded(
-            np.full(int(good.sum()), to), tips[good], offsets[good],
-            clearances[picked][good], parents[good],
-        )  # fmt: skip
+            Grown(layers, tips[good], offsets[good], clearances[good], parents[good])
+        )
 
     def _offspring(
         self, to: int, generation: IntArray

@@ -17,13 +17,6 @@ LONG_TRAVEL: Final = 0.064
 the clearance; [-]."""
 
 
-class Inner(NamedTuple):
-    """Places within parts, in order: the part of each, where it is in the interval."""
-
-    part: IntArray
-    share: FloatArray
-
-
 class Parts(NamedTuple):
     """Parts of intervals with both ends looked at: where, joint centres, clearance.
 
@@ -38,28 +31,38 @@ class Parts(NamedTuple):
     clearances: FloatArray
     next_clearances: FloatArray
 
-    def inner(self, counts: IntArray) -> Inner:
-        """The places that cut every part evenly, shape (n,) counts of 2 and more."""
+    def inner(self, counts: IntArray) -> tuple[IntArray, FloatArray]:
+        """The places that cut every part evenly, shape (n,) counts of 2 and more.
+
+        Returns:
+            The part of each, in order, and where it is in its interval, (r,) each.
+        """
         part = np.repeat(np.arange(len(counts)), counts - 1)
         first = np.cumsum(counts - 1) - (counts - 1)
         step = (np.arange(len(part)) - first[part] + 1) / counts[part]
         low, high = self.low[part], self.high[part]
-        return Inner(part, low + step * (high - low))
+        return part, low + step * (high - low)
 
     def take(self, kept: BoolArray) -> "Parts":
         """Some of the parts."""
         return Parts._make(values[kept] for values in self)
 
-    def cut(self, inner: Inner, centres: FloatArray, clearances: FloatArray) -> "Parts":
+    def cut(
+        self,
+        part: IntArray,
+        share: FloatArray,
+        centres: FloatArray,
+        clearances: FloatArray,
+    ) -> "Parts":
         """The parts between the places, every place of each part in order."""
         number = np.arange(len(self.interval))
         # Part by part: its begin, then its places; its places, then its end.
-        begins = np.argsort(np.append(number, inner.part), kind="stable")
-        ends = np.argsort(np.append(inner.part, number), kind="stable")
+        begins = np.argsort(np.append(number, part), kind="stable")
+        ends = np.argsort(np.append(part, number), kind="stable")
         return Parts(
-            np.append(self.interval, self.interval[inner.part])[begins],
-            np.append(self.low, inner.share)[begins],
-            np.append(inner.share, self.high)[ends],
+            np.append(self.interval, self.interval[part])[begins],
+            np.append(self.low, share)[begins],
+            np.append(share, self.high)[ends],
             np.concatenate([self.centres, centres])[begins],
             np.concatenate([centres, self.next_centres])[ends],
             np.concatenate([self.clearances, clearances])[begins],

@@ -279,14 +279,14 @@ class Judge:
             if not doubtful.any():
                 return good, begin
             parts, counts = parts.take(doubtful), counts[doubtful]
-            inner = parts.inner(counts.max(axis=1))
-            where = parts.interval[inner.part]
+            part, share = parts.inner(counts.max(axis=1))
+            where = parts.interval[part]
             centres, clearances = self._states(
-                intervals, where, inner.share, most[where], ask,
-                knees, counts[inner.part] > 0,
+                intervals, where, share, most[where], ask,
+                knees, counts[part] > 0,
             )  # fmt: skip
             good[where[~(clearances.min(axis=1) >= need[where] - tol)]] = False
-            parts = parts.cut(inner, centres, clearances)
+            parts = parts.cut(part, share, centres, clearances)
         # What is not settled after all cuts is not known to be clear.
         good[parts.interval] = False
         return good, begin

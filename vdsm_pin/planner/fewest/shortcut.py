@@ -87,14 +87,6 @@ def _spans(corners: Corners, stride: int, phase: int) -> list[tuple[int, int]]:
     return spans
 
 
-def _allowed(state: Looks, new: Looks, span: tuple[int, int], drawn: bool) -> bool:
-    """Whether a flattened span bends no more joints over its length than before."""
-    a, b = span
-    if not drawn:
-        return True
-    return int(new.changed[a + 1 : b].sum()) <= int(state.changed[a + 1 : b].sum())
-
-
 def shortcut(judge: Judge, corners: Corners, weights: CostWeights) -> Corners:
     """Corners pulled straight wherever that keeps clearance, limits and sparsity.
 
@@ -138,13 +130,13 @@ def _round(
     kept = []
     place = 0
     taken = np.zeros(len(corners.tips), dtype=np.bool_)
-    for span in spans:
-        a, b = span
-        if good[place : place + b - a].all() and _allowed(
-            state, new, span, bool(corners.drawn[a])
-        ):
-            kept.append(span)
-            taken[a + 1 : b] = True
+    for a, b in spans:
+        inner, clear = slice(a + 1, b), good[place : place + b - a].all()
+        # Where the tip draws, no more joints may bend over a span than before.
+        fewer = new.changed[inner].sum() <= state.changed[inner].sum()
+        if clear and (fewer or not corners.drawn[a]):
+            kept.append((a, b))
+            taken[inner] = True
         place += b - a
     state = Looks._make(np.where(taken, *both) for both in zip(new, state, strict=True))
     return _flattened(judge, corners, kept), state

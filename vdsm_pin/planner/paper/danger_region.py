@@ -125,7 +125,7 @@ class DangerRegion:
     def covers(self, points: FloatArray) -> BoolArray:
         """Whether points outside lie behind the region as seen from P_1, (n,)."""
         touch = self.radius - TOLERANCES.on_boundary
-        return covered(self.corners, self.radius, self.centre, touch, read_only(points))
+        return covered(self.core, self.centre, touch, read_only(points))
 
     def visits(self, points: FloatArray) -> list[Visit]:
         """Stays in the shadow along a sequence of points outside or inside, (n, 2)."""
@@ -155,12 +155,5 @@ class DangerRegion:
         Returns:
             Polyline from start to end, shape (m, 2); [m].
         """
-        return walk_round(
-            self.corners,
-            self.radius,
-            self.centre,
-            read_only(start),
-            read_only(end),
-            sense,
-            ARC_STEP,
-        )
+        ends = read_only(start), read_only(end)
+        return walk_round(self.core, self.centre, *ends, sense, ARC_STEP)

@@ -9,22 +9,22 @@ import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.paper.region_kernels import point_to_core, sides_of, wrapped
+from vdsm_pin.planner.paper.region_kernels import (
+    Core,
+    point_to_core,
+    sides_of,
+    wrapped,
+)
 
 
 @compiled
 def tangent_of(
-    corners: FloatArray,
-    radius: float,
-    centre: FloatArray,
-    point: FloatArray,
-    sense: int,
+    core: Core, centre: FloatArray, point: FloatArray, sense: int
 ) -> tuple[int, float]:
     """Where the tangent from a point outside touches.
 
     Args:
-        corners: Of the region.
-        radius: Of the region.
+        core: Of the region.
         centre: A point inside, shape (2,).
         point: Shape (2,).
         sense: 1 for the tangent a counterclockwise walk leaves on (region on the left),
@@ -34,6 +34,7 @@ def tangent_of(
         The corner whose arc is touched, and the direction of the boundary's outward
         normal there; [rad].
     """
+    corners, radius = core
     towards = np.arctan2(centre[1] - point[1], centre[0] - point[0])
     touched, least, heading = 0, np.inf, towards
     for i in range(corners.shape[0]):
@@ -47,24 +48,19 @@ def tangent_of(
 
 @compiled
 def covered(
-    corners: FloatArray,
-    radius: float,
-    centre: FloatArray,
-    touch: float,
-    points: FloatArray,
+    core: Core, centre: FloatArray, touch: float, points: FloatArray
 ) -> BoolArray:
     """Which points the straight arm from the origin reaches through the region only.
 
     Args:
-        corners: Of the region.
-        radius: Of the region.
+        core: Of the region.
         centre: A point inside, shape (2,).
         touch: Points nearer to the core count as inside, not as covered.
         points: Shape (n, 2).
     """
-    origin = np.zeros(2)
-    low, low_normal = tangent_of(corners, radius, centre, origin, 1)
-    high, high_normal = tangent_of(corners, radius, centre, origin, -1)
+    (corners, radius), origin = core, np.zeros(2)
+    low, low_normal = tangent_of(core, centre, origin, 1)
+    high, high_normal = tangent_of(core, centre, origin, -1)
     right_x = corners[low, 0] + radius * np.cos(low_normal)
     right_y = corners[low, 1] + radius * np.sin(low_normal)
     left_x = corners[high, 0] + radius * np.cos(high_normal)
@@ -85,8 +81,7 @@ def covered(
 
 @compiled
 def walk_round(
-    corners: FloatArray,
-    radius: float,
+    core: Core,
     centre: FloatArray,
     start: FloatArray,
     end: FloatArray,
@@ -96,8 +91,7 @@ def walk_round(
     """The taut way from start round the region to end.
 
     Args:
-        corners: Of the region.
-        radius: Of the region.
+        core: Of the region.
         centre: A point inside, shape (2,).
         start: Outside or on the boundary, shape (2,).
         end: Outside or on the boundary, shape (2,).
@@ -107,8 +101,9 @@ def walk_round(
     Returns:
         Polyline from start to end, shape (m, 2).
     """
-    leave = tangent_of(corners, radius, centre, start, sense)[1]
-    arrive = tangent_of(corners, radius, centre, end, -sense)[1]
+    corners, radius = core
+    leave = tangent_of(core, centre, start, sense)[1]
+    arrive = tangent_of(core, centre, end, -sense)[1]
     turn = (sense * (arrive - leave)) % (2.0 * np.pi)
     # Corners of a way lie outside the arc, so that its chords do not cut in.
     grown = radius / np.cos(0.5 * step)
