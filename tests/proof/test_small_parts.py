@@ -10,7 +10,7 @@ from oracles.plain import plain
 from oracles.tree_queries import random_box, random_path, random_tree, unit
 
 from vdsm_pin.geometry import bernstein
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import PAGES, FloatArray, paged_zeros
 from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.kernels import LOWER, NORMAL
@@ -665,3 +665,15 @@ def test_rounding_grows_with_what_is_far() -> None:
 def test_the_worst_of_verdicts_is_refuted() -> None:
     assert RANK[CERTIFIED] < RANK[UNDECIDED] < RANK[REFUTED]
     assert RANK[RANK].tolist() == [CERTIFIED, REFUTED, UNDECIDED]
+
+
+@pytest.mark.parametrize("size", [5, PAGES])
+def test_zeros_by_the_page_are_zeros_to_write_to(size: int) -> None:
+    found, usual = paged_zeros(size, 2), np.zeros((size, 2))
+    assert (found.dtype, found.strides) == (usual.dtype, usual.strides)
+    assert found.flags.num & 0x501 == usual.flags.num & 0x501  # as compiled code asks
+    np.testing.assert_array_equal(found, usual)
+    found[-1] = 1.0
+    assert found.sum() == 2.0
+    with pytest.raises(MemoryError):
+        paged_zeros(1 << 46)

@@ -3,6 +3,8 @@
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from math import prod
+from mmap import mmap
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -15,6 +17,27 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 ByteArray: TypeAlias = npt.NDArray[np.uint8]
+
+
+PAGES: Final = 1 << 18
+"""From so many bytes on zeros are taken page by page."""
+
+
+def paged_zeros(*shape: int) -> FloatArray:
+    """Zeros of which only the pages that something is written to cost time and memory.
+
+    numpy clears what memory it is given a second time, however little is written.
+
+    Raises:
+        MemoryError: If there are no such addresses.
+    """
+    size = prod(shape) * np.dtype(np.float64).itemsize
+    if size < PAGES:
+        return np.zeros(shape)
+    try:
+        return np.frombuffer(mmap(-1, size), np.float64).reshape(shape)
+    except OSError as error:
+        raise MemoryError(*error.args) from None
 
 
 def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:

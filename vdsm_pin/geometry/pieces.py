@@ -161,7 +161,7 @@ def disc_extent(normal: FloatArray) -> FloatArray:
         normal: Of length 1, shape (3,); [-].
     """
     # Not sqrt(1 - normal^2), which loses half the digits along the normal.
-    return np.hypot(np.roll(normal, 1), np.roll(normal, 2))
+    return np.hypot(normal[[2, 0, 1]], normal[[1, 2, 0]])
 
 
 def _levels(n: int) -> list[tuple[IntArray, IntArray, IntArray]]:

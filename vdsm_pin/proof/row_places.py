@@ -73,7 +73,11 @@ def _see_places(
 def _see_corners(task: Task, rows: Rows, corners: IntArray) -> None:
     """The same of a body's corners, and what they stem from, unless it is known."""
     apart()
-    places, known, size = task.places, rows.tracks.known, 0
+    places, known, size, new = task.places, rows.tracks.known, 0, False
+    for corner in corners:
+        new |= known[corner] != rows.block[0]
+    if not new:
+        return
     missing = np.zeros(2 * corners.size, np.int64)
     for in_world in (True, False):
         for corner in corners:
