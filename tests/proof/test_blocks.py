@@ -29,6 +29,7 @@ from vdsm_pin.proof.plane_bounds import (
 )
 from vdsm_pin.proof.prover import prove, start_proof
 from vdsm_pin.proof.proving import dense_rows
+from vdsm_pin.proof.results import own_up
 from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, UNDECIDED, Rules, Task, mover_of
@@ -396,31 +397,29 @@ def test_how_much_is_judged_is_told_while_it_is() -> None:
 @pytest.mark.parametrize(
     "judged", [(BLOCK, 0), (0, BLOCK), (BLOCK, BLOCK), (0, 0), (BLOCK - 1, BLOCK)]
 )
-def test_each_pair_owns_up_to_what_it_was_not_judged(
-    judged: tuple[int, int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Time may end between two pairs of one block."""
+def test_each_pair_owns_up_to_what_it_was_not_judged(judged: tuple[int, int]) -> None:
+    """Time may end between two pairs of one block, or before the first."""
     tree, path = approaching(BLOCK)
     bodies, table = (
         [ball(1, 0.0), ball(0, 2.0), ball(0, 3.0)],
         PairTable.of([Pair(0, 1), Pair(0, 2)]),
     )
     proving, _ = start_proof(tree, bodies, path, table)
-
-    def cut(*_: int) -> bool:
-        proving.results.counts[:, CERTIFIED] = judged
-        proving.results.best[:, 0] = 1.0
-        proving.results.profile[:] = 1.0
-        return False
-
-    monkeypatch.setattr(type(proving), "sweep", cut)
-    assert not proving.run()
+    results = proving.results
+    results.counts[:, CERTIFIED] = judged
+    results.best[:, 0] = 1.0
+    results.profile[:] = 1.0
+    own_up(results, BLOCK)
     left = BLOCK - np.array(judged)
-    np.testing.assert_array_equal(proving.results.counts[:, UNDECIDED], left)
-    assert (proving.results.best[left > 0, 0] == -np.inf).all()
-    assert (proving.results.best[left == 0, 0] == 1.0).all()
+    np.testing.assert_array_equal(results.counts[:, UNDECIDED], left)
+    assert (results.best[left > 0, 0] == -np.inf).all()
+    assert (results.best[left == 0, 0] == 1.0).all()
     expected = -np.inf if left.any() else 1.0
-    assert (proving.results.profile[0] == expected).all()
+    assert (results.profile[0] == expected).all()
+    over, _ = start_proof(tree, bodies, path, table, budget=Budget(until=0.0))
+    assert not over.run()
+    assert (over.results.counts[:, UNDECIDED] == BLOCK).all()
+    assert (over.results.best[:, 0] == -np.inf).all()
 
 
 def test_a_plane_serves_up_to_the_first_bound_that_is_too_low_or_too_wide() -> None:

@@ -6,15 +6,17 @@ from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.proof.broad_phase import settle_far
 from vdsm_pin.proof.cached_planes import served
-from vdsm_pin.proof.far_pairs import BroadPhase
+from vdsm_pin.proof.far_pairs import BroadPhase, merge_far
 from vdsm_pin.proof.layouts import OWN_POINT, ROW, UP, WIDTH
+from vdsm_pin.proof.least_bracket import narrow
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.plane_bounds import bound_above, bound_below
-from vdsm_pin.proof.results import Results, note_block, note_upper
+from vdsm_pin.proof.results import Results, note_block, note_upper, own_up
 from vdsm_pin.proof.row_places import fill_rows, seen
 from vdsm_pin.proof.rows import BLOCK
-from vdsm_pin.proof.terms import CERTIFIED, Task
+from vdsm_pin.proof.terms import ACROSS, CERTIFIED, WITHIN, Task
+from vdsm_pin.proof.witnesses import place_best
 from vdsm_pin.proof.workspace import Workspace
 
 
@@ -76,6 +78,41 @@ def _sweep_block(
 
 
 @compiled
+def _sweep(
+    task: Task,
+    motion: Motion,
+    work: Workspace,
+    results: Results,
+    broad: BroadPhase,
+    span: tuple[int, int],
+    yes_or_no: bool,
+) -> bool:
+    """`sweep` of what is borrowed."""
+    apart()
+    if task.rules.steady:
+        # Whoever asks about several error boxes leaves here what the last one added.
+        work.runs.growth[:] = 0.0
+    limit, settled = results.limit, np.zeros(2, np.bool_)
+    before, (first, last) = limit.copy(), span
+    for start in range(first, last, BLOCK):
+        if clock() > task.rules.until:
+            return False
+        # A limit that falls is soon out of date: what is below it is looked at later.
+        for group in range(2):
+            settled[group] = limit[group] >= before[group] - task.rules.gap
+            settled[group] &= limit[group] < np.inf and not yes_or_no
+            before[group] = limit[group]
+        count = min(BLOCK, last - start)
+        stretch = Stretch(start, start - first, count, False, yes_or_no, False)
+        fill_rows(task, motion, work.rows, start, count)
+        n_near = settle_far(task, work, results, broad, stretch)
+        near = broad.near[:n_near]
+        if not _sweep_block(task, motion, work, results, near, stretch, settled):
+            return False
+    return True
+
+
+@compiled
 def sweep(
     task: Task,
     motion: Motion,
@@ -105,24 +142,45 @@ def sweep(
     work = borrowed(work)
     results = borrowed(results)
     broad = borrowed(broad)
-    if task.rules.steady:
-        # Whoever asks about several error boxes leaves here what the last one added.
-        work.runs.growth[:] = 0.0
-    limit, settled = results.limit, np.zeros(2, np.bool_)
-    before, (first, last) = limit.copy(), span
-    for start in range(first, last, BLOCK):
-        if clock() > task.rules.until:
-            return False
-        # A limit that falls is soon out of date: what is below it is looked at later.
-        for group in range(2):
-            settled[group] = limit[group] >= before[group] - task.rules.gap
-            settled[group] &= limit[group] < np.inf and not yes_or_no
-            before[group] = limit[group]
-        count = min(BLOCK, last - start)
-        stretch = Stretch(start, start - first, count, False, yes_or_no, False)
-        fill_rows(task, motion, work.rows, start, count)
-        n_near = settle_far(task, work, results, broad, stretch)
-        near = broad.near[:n_near]
-        if not _sweep_block(task, motion, work, results, near, stretch, settled):
-            return False
-    return True
+    return _sweep(task, motion, work, results, broad, span, yes_or_no)
+
+
+@compiled
+def judge(
+    task: Task,
+    motion: Motion,
+    work: Workspace,
+    results: Results,
+    broad: BroadPhase,
+    span: tuple[int, int],
+    narrowing: bool,
+) -> bool:
+    """Judge some intervals, whatever the time does not allow as undecided.
+
+    The far pairs are brought to the results, the witnesses placed on the surfaces.
+
+    Returns:
+        Whether there was time for all.
+
+    Args:
+        task: As for `sweep`, like those that follow.
+        motion: Rows of joint values.
+        work: Working space.
+        results: Where to write.
+        broad: For the pairs that are far.
+        span: The intervals.
+        narrowing: Whether to narrow the least brackets, of all intervals, in time.
+    """
+    task = borrowed(task)
+    motion = borrowed(motion)
+    work = borrowed(work)
+    results = borrowed(results)
+    broad = borrowed(broad)
+    in_time = _sweep(task, motion, work, results, broad, span, False)
+    merge_far(task, motion, work.ends, results, broad)
+    own_up(results, span[1] - span[0])
+    if in_time and narrowing:
+        narrow(task, motion, work, results, ACROSS)
+        narrow(task, motion, work, results, WITHIN)
+    place_best(task, motion, work.ends, results.best)
+    return in_time

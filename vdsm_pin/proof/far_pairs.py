@@ -218,8 +218,8 @@ def merge_far(
         results: Where to write.
         broad: What was settled.
     """
-    task, motion, ends = borrowed(task), borrowed(motion), borrowed(ends)
-    results, broad, at = borrowed(results), borrowed(broad), np.zeros(3)
+    apart()
+    at = np.zeros(3)
     n_bodies, n_obstacles = broad.number.shape
     for body in range(n_bodies):
         frame, corner = task.bodies.frame[body], task.bodies.first[body]

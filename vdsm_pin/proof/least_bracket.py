@@ -2,14 +2,16 @@
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, clock, compiled
+from vdsm_pin.compiled import apart, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.proof.heaps import push
+from vdsm_pin.proof.heaps import pop, push
 from vdsm_pin.proof.layouts import (
     AT_UPPER,
     END,
+    HELD,
     INTERVAL,
     KEY,
+    LOW,
     OWN,
     PAIR,
     SLICE,
@@ -20,9 +22,34 @@ from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import fill_rows
-from vdsm_pin.proof.search import Slicing, Witnesses, tighten
-from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.search import Slicing, new_witnesses, tighten
+from vdsm_pin.proof.terms import ACROSS, Task
 from vdsm_pin.proof.workspace import Workspace
+
+
+@compiled
+def _in_order(task: Task, results: Results, group: int, heap: FloatArray) -> IntArray:
+    """The candidates of a group that may hold the least bound.
+
+    The least first, since it lowers the limit most, then block by block.
+    """
+    apart()
+    held, pairs = results.candidates, task.pairs
+    row, count, n_pairs = np.zeros(SLICE), 0, pairs.rough.shape[0]
+    for c in range(results.tally[HELD]):
+        below = held.lower[c] < results.limit[group] - task.rules.gap
+        if below and pairs.group[held.pair[c]] == group:
+            row[KEY], row[PAIR] = held.first[c] * n_pairs + held.pair[c], c
+            count = push(heap, count, row)
+    order, least = np.zeros(count, np.int64), 0
+    for k in range(order.size):
+        count = pop(heap, count, row)
+        order[k] = int(row[PAIR])
+        if held.lower[order[k]] < held.lower[order[least]]:
+            least = k
+    for k in range(least, 0, -1):
+        order[k - 1], order[k] = order[k], order[k - 1]
+    return order
 
 
 @compiled
@@ -33,16 +60,16 @@ def _look_again(
     results: Results,
     group: int,
     order: IntArray,
-    heap: FloatArray,
 ) -> int:
-    """Sweep the candidates closely and push the intervals that are still below.
+    """Sweep the candidates closely; what is still below goes to `work.intervals`.
 
     Returns:
-        Number of intervals in the heap. What finds no room in it, or is not looked at
-        since links and obstacles meet, is left in `results.overflow`.
+        Their number. What finds no room, or is not looked at since links and obstacles
+        meet, is left in `results.overflow`.
     """
     apart()
     held, lower, count = results.candidates, work.runs.lower, 0
+    heap = work.intervals
     row, beyond = np.zeros(SLICE), results.overflow
     row[END], filled = 1.0, -1
     for c in order:
@@ -71,48 +98,57 @@ def _look_again(
 
 
 @compiled
+def _raise_bounds(
+    task: Task, results: Results, group: int, heap: FloatArray, count: int
+) -> None:
+    """Raise the lower bounds of a group's pairs to what is proved of all intervals.
+
+    Args:
+        task: The pairs and rules.
+        results: Bounds and profile are raised.
+        group: The group.
+        heap: Together with `results.overflow` its first rows hold all that is not
+            proved to be above the limit, less the gap.
+        count: Number of these rows.
+    """
+    apart()
+    groups, best, profile = task.pairs.group, results.best, results.profile
+    proved = np.full(best.shape[0], results.limit[group] - task.rules.gap)
+    for k in range(count):
+        pair = int(heap[k, PAIR])
+        proved[pair] = min(proved[pair], heap[k, KEY])
+    least = np.inf
+    for pair in range(proved.size):
+        if groups[pair] == group:
+            bound = min(proved[pair], results.overflow[group])
+            best[pair, LOW], least = max(best[pair, LOW], bound), min(least, bound)
+    if group == ACROSS:
+        # Every interval keeps what the narrowing proved of all of them.
+        for column in range(profile.shape[1]):
+            for k in range(profile.shape[2]):
+                profile[0, column, k] = max(profile[0, column, k], least)
+
+
+@compiled
 def narrow(
-    task: Task,
-    motion: Motion,
-    work: Workspace,
-    results: Results,
-    order: IntArray,
-    heap: FloatArray,
-    found: Witnesses,
-) -> int:
+    task: Task, motion: Motion, work: Workspace, results: Results, group: int
+) -> None:
     """Narrow the least bracket of a group of pairs.
 
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
         work: Working space.
-        results: Holds the candidates; best upper bounds and the limit are improved. Its
-            counts are spoilt: every candidate is counted again.
-        order: Candidates of one group, those of one block together.
-        heap: Room for intervals and their slices.
-        found: Working space, nothing met yet.
-
-    Returns:
-        Number of slices in the heap: together with `results.overflow` they hold all
-        that is not proved to be above the limit, less the gap; -1 if the time is over.
+        results: Holds the candidates; bounds, profile and limit are improved.
+        group: The group.
     """
-    task = borrowed(task)
-    motion = borrowed(motion)
-    work = borrowed(work)
-    results = borrowed(results)
-    order = borrowed(order)
-    heap = borrowed(heap)
-    found = borrowed(found)
-    group = task.pairs.group[results.candidates.pair[order[0]]]
-    count = _look_again(task, motion, work, results, group, order, heap)
-    found = Witnesses(
-        found.upper,
-        found.interval,
-        found.time,
-        found.points,
-        found.instant,
-        results.limit[group],
-    )
+    apart()
+    heap = work.intervals
+    order = _in_order(task, results, group, heap)
+    if order.size == 0:
+        return
+    count = _look_again(task, motion, work, results, group, order)
+    found = new_witnesses(results.best.shape[0], results.limit[group])
     slicing = Slicing(task, motion, work.ends, work.space)
     count = tighten(slicing, heap, count, found)
     for pair in range(found.upper.size):
@@ -121,4 +157,6 @@ def narrow(
             best[UP], best[AT_UPPER] = found.upper[pair], found.interval[pair]
             best[TIME], best[OWN:] = found.time[pair], found.points[pair]
         results.limit[group] = min(results.limit[group], found.instant[pair])
-    return -1 if clock() > task.rules.until else count
+    # Where not all was looked at again, what was proved before holds.
+    if not clock() > task.rules.until:
+        _raise_bounds(task, results, group, heap, count)

@@ -68,7 +68,8 @@ class Stretch(NamedTuple):
         closely: Whether bounds below the least clearance met are made as good as they
             can be.
         yes_or_no: Whether to stop at the first interval that is not proved.
-        whole: Whether no interval is subdivided: its bound is what one plane proves.
+        again: Whether it is a second look: no interval is subdivided, its bound is what
+            one plane proves, or counted.
     """
 
     start: int
@@ -76,7 +77,7 @@ class Stretch(NamedTuple):
     size: int
     closely: bool
     yes_or_no: bool
-    whole: bool
+    again: bool
 
 
 @compiled
@@ -239,7 +240,8 @@ def _note_stretch(
     """Count and record the intervals, first to below last, that one plane proves."""
     local, done = span
     runs, best, group = work.runs, results.best[pair], task.pairs.group[pair]
-    results.counts[pair, CERTIFIED] += done - local
+    if not stretch.again:
+        results.counts[pair, CERTIFIED] += done - local
     points = work.planes[pair, OWN_POINT:WIDTH]
     note_upper(best, runs, points, stretch.start, local, done)
     if task.rules.nominal:
@@ -300,7 +302,7 @@ def sweep_pair(
                 proved = _renew(task, row, work, local, pair, goal, bar)
                 continue
             # This interval allows no more, and may be proved nevertheless.
-            done += runs.lower[local] >= required or stretch.whole
+            done += runs.lower[local] >= required or stretch.again
         if done > local:
             span = local, done
             _note_stretch(task, mover, work, results, pair, stretch, span)

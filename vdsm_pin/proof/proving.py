@@ -5,29 +5,20 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.blocks import judge, sweep
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.far_pairs import BroadPhase, merge_far, new_broad_phase
+from vdsm_pin.proof.far_pairs import BroadPhase, new_broad_phase
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
     BEST,
-    HELD,
-    KEY,
-    LOW,
-    PAIR,
-    SLICE,
     TALLY,
     TIME,
 )
-from vdsm_pin.proof.least_bracket import narrow
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.results import Candidates, Dense, Results
 from vdsm_pin.proof.rows import BLOCK
-from vdsm_pin.proof.search import Witnesses
-from vdsm_pin.proof.terms import ACROSS, UNDECIDED, WITHIN, Task
-from vdsm_pin.proof.witnesses import place_best
+from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import Workspace, new_workspace
 
 SIDES: Final = 2
@@ -122,29 +113,15 @@ class Proving:
         Returns:
             Whether there was time to judge all; what is not judged is undecided.
         """
-        in_time = self.judge(0, self.n_intervals)
-        if in_time:
-            heap = np.zeros((self.budget.candidates + self.budget.slices, SLICE))
-            for group in (ACROSS, WITHIN):
-                self._narrow(group, heap)
-        self.place_witnesses()
-        return in_time
+        return self._judge((0, self.n_intervals), True)
 
     def judge(self, first: int, last: int) -> bool:
-        """Judge some intervals, whatever the time does not allow as undecided.
+        """The same of some intervals, no bracket narrowed."""
+        return self._judge((first, last), False)
 
-        Returns:
-            Whether there was time for all.
-        """
-        in_time = self.sweep(first, last)
-        merge_far(self.task, self.motion, self.work.ends, self.results, self.broad)
-        self._own_up(last - first)
-        return in_time
-
-    def place_witnesses(self) -> None:
-        """Put the witnesses that were found on the surfaces, in the world's frame."""
-        best = self.results.best
-        place_best(self.task, self.motion, self.work.ends, best)
+    def _judge(self, span: tuple[int, int], narrowing: bool) -> bool:
+        args = self.task, self.motion, self.work, self.results, self.broad
+        return bool(judge(*args, span, narrowing))
 
     def new_results(self) -> Results:
         """Where to write what is asked again."""
@@ -155,64 +132,6 @@ class Proving:
         """The same question with nothing found yet; the planes are carried on."""
         broad = new_broad_phase(self.task, self.broad.number.shape[1])
         return replace(self, results=results, broad=broad)
-
-    def _own_up(self, n_intervals: int) -> None:
-        """Call undecided what the time did not allow to judge."""
-        results = self.results
-        left = n_intervals - results.counts.sum(axis=1)
-        if left.any():
-            results.counts[:, UNDECIDED] += left
-            results.best[left > 0, LOW] = -np.inf
-            results.profile[0] = -np.inf
-
-    def _narrow(self, group: int, heap: FloatArray) -> None:
-        """Narrow the least bracket of one group of pairs; the heap is working space."""
-        task, results = self.task, self.results
-        groups = task.pairs.group[: len(task.pairs.rough)]
-        mine, order = groups == group, self._candidates(group)
-        if not order.size:
-            return
-        found = _no_witnesses(len(mine))
-        again = results._replace(counts=np.zeros_like(results.counts))
-        count = narrow(task, self.motion, self.work, again, order, heap, found)
-        if count < 0:
-            return  # not all was looked at again: what was proved before holds
-        proved = np.full(len(mine), results.limit[group] - task.rules.gap)
-        np.minimum.at(proved, heap[:count, PAIR].astype(np.int64), heap[:count, KEY])
-        proved = np.minimum(proved, results.overflow[group])[mine]
-        results.best[mine, LOW] = np.maximum(results.best[mine, LOW], proved)
-        if group == ACROSS:
-            # Every interval keeps what the narrowing proved of all of them.
-            lower = results.profile[0]
-            np.maximum(lower, proved.min(), out=lower)
-
-    def _candidates(self, group: int) -> IntArray:
-        """What may hold the least bound.
-
-        The least first, since it lowers the limit most, then block by block.
-        """
-        task, results = self.task, self.results
-        held, n = results.candidates, results.tally[HELD]
-        near = np.flatnonzero(task.pairs.group[held.pair[:n]] == group)
-        near = near[held.lower[near] < results.limit[group] - task.rules.gap]
-        if not near.size:
-            return np.zeros(0, np.int64)
-        order = near[np.lexsort((held.pair[near], held.first[near]))]
-        least = np.argmin(held.lower[order])
-        found: IntArray = np.concatenate([order[[least]], np.delete(order, least)])
-        return found
-
-
-def _no_witnesses(n_pairs: int) -> Witnesses:
-    """Nothing met yet."""
-    return Witnesses(
-        upper=np.full(n_pairs, np.inf),
-        interval=np.zeros(n_pairs, np.int64),
-        time=np.zeros(n_pairs),
-        points=np.zeros((n_pairs, 6)),
-        instant=np.full(n_pairs, np.inf),
-        limit=np.inf,
-    )
 
 
 def new_proving(
@@ -233,7 +152,11 @@ def new_proving(
         task=task,
         motion=motion,
         work=new_workspace(
-            task, motion.knots.shape[1], budget.slices, min(BLOCK, n_intervals)
+            task,
+            motion.knots.shape[1],
+            budget.slices,
+            min(BLOCK, n_intervals),
+            budget.candidates,
         ),
         results=new_results(len(task.pairs.rough), columns, n_intervals, budget),
         broad=new_broad_phase(task, n_obstacles),

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.layouts import (
@@ -15,7 +17,7 @@ from vdsm_pin.proof.layouts import (
     UP,
 )
 from vdsm_pin.proof.plane_bounds import Runs
-from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.terms import UNDECIDED, Task
 
 
 class Candidates(NamedTuple):
@@ -219,3 +221,16 @@ def note_block(
         best[LOW], best[AT_LOWER] = lower[at], first + at
     if any_below(lower, results.limit[pairs.group[pair]] - task.rules.gap):
         nominate(task, results, pair, first, lower)
+
+
+@compiled
+def own_up(results: Results, n_intervals: int) -> None:
+    """Call undecided what the time did not allow to judge of so many intervals."""
+    apart()
+    for pair in range(results.counts.shape[0]):
+        counts = results.counts[pair]
+        left = n_intervals - counts.sum()
+        if left != 0:
+            counts[UNDECIDED] += left
+            results.best[pair, LOW] = -np.inf
+            results.profile[0] = -np.inf

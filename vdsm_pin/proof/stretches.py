@@ -65,9 +65,7 @@ class Stretches:
         results = proving.new_results()
         if low == floor(low) < high == floor(high):
             fresh = proving.fresh(results)
-            in_time = fresh.judge(int(low), int(high))
-            fresh.place_witnesses()
-            return results, in_time
+            return results, fresh.judge(int(low), int(high))
         slices = _slices(low, high, proving.n_intervals)
         asked = proving.task, proving.motion, proving.work, self._pairs
         _judge_slices(*asked, results.best, results.counts, slices)

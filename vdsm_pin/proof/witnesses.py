@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, compiled
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.layouts import AT_UPPER, OTHER, OWN, TIME, UP
 from vdsm_pin.proof.motions import Motion, interpolate
@@ -91,6 +91,6 @@ def place_witness(
 @compiled
 def place_best(task: Task, motion: Motion, ends: Ends, best: FloatArray) -> None:
     """The same of all pairs, their best rows of shape (n_pairs, BEST)."""
-    task, motion, ends = borrowed(task), borrowed(motion), borrowed(ends)
+    apart()
     for pair in range(best.shape[0]):
         place_witness(task, motion, ends, pair, best[pair])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import apart, compiled
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, paged_zeros
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
 from vdsm_pin.proof.packed_tree import REVOLUTE, Pose
@@ -26,6 +26,7 @@ class Workspace(NamedTuple):
         ends: For slices inside an interval.
         space: For bounds.
         heap: For subdivision; its length is the budget of one interval and pair.
+        intervals: The same memory and more of it, where the least bracket is narrowed.
     """
 
     rows: Rows
@@ -34,6 +35,7 @@ class Workspace(NamedTuple):
     ends: Ends
     space: Space
     heap: FloatArray
+    intervals: FloatArray
 
 
 @compiled
@@ -47,7 +49,7 @@ def forget(planes: FloatArray) -> None:
 
 
 def new_workspace(
-    task: Task, n_columns: int, budget: int, block: int = BLOCK
+    task: Task, n_columns: int, budget: int, block: int = BLOCK, candidates: int = 0
 ) -> Workspace:
     """Fresh working space; no pair remembers a plane yet.
 
@@ -56,6 +58,7 @@ def new_workspace(
         n_columns: Length of a row of q.
         budget: Most slices of one interval and pair.
         block: Most intervals whose rows are filled at once, BLOCK at most.
+        candidates: Most intervals kept for narrowing the least bracket.
     """
     n_joints, n_ways = task.tree.parent.size, task.ways.rest.size
     corners = int(np.diff(task.bodies.first).max(initial=1))
@@ -63,6 +66,7 @@ def new_workspace(
     held = HELD_AT + 3 * corners if many else HELD_AT
     planes = np.zeros((len(task.pairs.rough), held))
     tracks = new_tracks(task.places.way.size, block)
+    intervals = paged_zeros(candidates + budget, SLICE)
     forget(planes)
     return Workspace(
         new_rows(n_joints + 1, n_ways, tracks, block),
@@ -70,7 +74,8 @@ def new_workspace(
         planes,
         new_ends(n_joints + 1, n_ways, n_columns),
         new_space(int((task.tree.kind == REVOLUTE).sum()), corners),
-        np.zeros((budget, SLICE)),
+        intervals[:budget],
+        intervals,
     )
 
 
