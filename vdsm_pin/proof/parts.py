@@ -24,7 +24,7 @@ class PartPlan:
         bodies: Those at rest in the world first, then the others, then parts of bodies
             with several.
         pairs: Of parts and partners.
-        owner: The pair that each stands for, shape (n,).
+        owner: The pair that each stands for, none missing, rising, shape (n,).
         swapped: Whether its first body is the partner, shape (n,).
         number: Number of the body as it was given, of each body, (n_bodies,).
         n_obstacles: Number of those at rest in the world.

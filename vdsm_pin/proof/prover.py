@@ -128,9 +128,10 @@ def verdicts_of(counts: IntArray) -> IntArray:
 
 def summed(results: Results, plan: PartPlan, n: int, in_time: bool) -> Proof:
     """What was proved of the parts of n pairs, summed up by pair."""
-    best, owner, judged = results.best, plan.owner, np.zeros((n, 3), np.int64)
-    np.add.at(judged, owner, results.counts)
-    least, met = _least(best[:, LOW], owner, n), _least(best[:, UP], owner, n)
+    best, owner = results.best, plan.owner
+    first = np.searchsorted(owner, np.arange(n))
+    judged = np.add.reduceat(results.counts, first) if n else results.counts
+    least, met = (np.lexsort((best[:, side], owner))[first] for side in (LOW, UP))
     points = best[met, OWN:].reshape(-1, 2, 3)
     turned = plan.swapped[met]
     points[turned] = points[turned, ::-1]
@@ -146,10 +147,3 @@ def summed(results: Results, plan: PartPlan, n: int, in_time: bool) -> Proof:
         profile=frozen(results.profile),
         stride=results.stride,
     )
-
-
-def _least(values: FloatArray, owner: IntArray, n: int) -> IntArray:
-    """Of each owner the number of its least value, shape (n,)."""
-    order = np.lexsort((values, owner))
-    first: IntArray = np.searchsorted(owner[order], np.arange(n))
-    return np.asarray(order[first])

@@ -10,7 +10,6 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.verification.coal_bodies import (
-    NOTHING,
     CoalCloud,
     CoalObstacle,
     distance_request,
@@ -124,20 +123,15 @@ class CoalShapes:
         within = np.arange(pair.size) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
         part = first[sides.one][pair] + within
         places = self._places(poses, Sides(*(side[pair] for side in sides)), part)
-        request, best = distance_request(), [NOTHING] * count
+        request, (distance, near, far) = distance_request(), found
         shapes, partners = self._parts.shapes, [self._bodies[k] for k in sides.other]
         calls = zip(pair.tolist(), part.tolist(), *places, strict=True)
         for k, number, turn, shift in calls:
             if (partner := partners[k]) is not None:
                 pose = coal.Transform3s(turn, shift)
                 answer = measure(request, shapes[number], pose, partner)
-                if answer.distance < best[k].distance:
-                    best[k] = answer
-        known = np.array([partner is not None for partner in partners], bool)
-        seen = np.flatnonzero(known & (n_parts > 0)).tolist()
-        answers = zip(*(best[k] for k in seen), strict=True) if seen else ()
-        for one, values in zip(found, answers, strict=bool(seen)):
-            one[seen] = values
+                if not distance[k] <= answer.distance:
+                    distance[k], near[k], far[k] = answer
         return found
 
     def _places(
