@@ -424,6 +424,8 @@ TEXT_DAMAGE = [
     ("a.dae", dae(f"<node><scale>{'1e300 ' * 3}</scale></node>"), "that is not affine"),
     ("a.dae", dae('<node id="n"><instance_node url="#n"/></node>'), "nodes 100 deep"),
     ("a.dae", dae(HERE, root="<tristrips><p>0 1 2</p></tristrips>"), "names no vert"),
+    ("a.dae", dae(HERE).replace("POSITION", "NORMAL"), "<vertices> without POSITION"),
+    ("a.dae", dae(HERE).replace("accessor", "extra"), "has a source without accessor"),
 ]
 
 
