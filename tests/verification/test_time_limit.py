@@ -3,9 +3,11 @@
 Oracle: the same verification without a limit.
 """
 
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.upper_clearance import upper_bounds
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW, UP
 from vdsm_pin.refinement import plan_and_verify
@@ -28,6 +31,7 @@ from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.pointing import check_pointing
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
@@ -125,6 +129,36 @@ def test_a_limit_at_any_moment_claims_no_more_than_was_proved() -> None:
         if partly == 3:
             return
     pytest.fail("no limit came in the middle of the proof")
+
+
+class Noting(Deadline):
+    """A limit that is never over, which notes who asks."""
+
+    asked: ClassVar[set[str]] = set()
+
+    def check(self, reached: str = "") -> None:
+        self.asked.add(sys._getframe(1).f_code.co_qualname)
+
+
+def test_each_step_that_may_be_long_asks_the_clock() -> None:
+    clock = Noting()
+    problem, rows = case(n=20)
+    verify(problem.under(ErrorBox(1e-4)), rows, joint_error=True, deadline=clock)
+    verify(case(0.0)[0].under(ErrorBox(0.03)), rows, deadline=clock)
+    look = Pointing(0.1, directions=np.eye(3)[:1])
+    looking = replace(problem, tip_path=replace(problem.path, pointing=look))
+    check_pointing(looking, replace(rows, on_path=~rows.on_path), clock)
+    assert clock.asked == {
+        "CoalArm._at",
+        "CoalArm._near",
+        "YesOrNoProof.holds",
+        "_look",
+        "_smallest",
+        "arm_shapes.<locals>.shape",
+        "check_cables",
+        "check_fk",
+        "counterexamples",
+    }
 
 
 def test_yes_or_no_and_the_joint_error_raise() -> None:
