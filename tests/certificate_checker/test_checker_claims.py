@@ -186,3 +186,29 @@ def test_pieces_are_tiled(ranges: list[tuple[int, int]], reason: str) -> None:
         whole = Solid("whole", np.zeros((12, 3, 3)))
         assert [*tiled(pair._replace(solid=whole), one, "", interval)]
         assert not whole.split
+
+
+@pytest.mark.parametrize(
+    ("ends", "reason"),
+    [
+        ([(0.0, 0.25), (0.25, 1.0)], ""),
+        ([(0.0, 1.0)], ""),
+        ([(0.0, 0.0), (0.0, 1.0)], "the slices do not tile at 0.0"),
+        ([(0.25, 1.0)], "the slices do not tile at 0.0"),
+        ([(0.0, 0.5), (0.25, 1.0)], "the slices do not tile at 0.5"),
+        ([(0.0, 0.5), (0.75, 1.0)], "the slices do not tile at 0.5"),
+        ([(0.0, 0.5)], "the slices end at 0.5"),
+        ([(0.0, 1.0), (1.0, 1.5)], "the slices end at 1.5"),
+        ([], "the slices end at 0.0"),
+    ],
+)
+def test_slices_are_tiled(ends: list[tuple[float, float]], reason: str) -> None:
+    interval, rest = Interval(Tree([]), []), Solid("rest", np.zeros((1, 1, 3)))
+    pair = Pair(Body(0, Solid("body", [[[0.0, 0.0, 0.0]]])), rest, 0, 0.0, 0.0)
+    proof = [[*both, [[0, 1, 0, 0, 1, 0.5]]] for both in ends]
+    if reason:
+        with pytest.raises(Rejected, match=reason):
+            [*tiled(pair, proof, "", interval)]
+    else:
+        planes = [*tiled(pair, proof, "", interval)]
+        assert [one.slice for one in planes] == [(interval, *both) for both in ends]
