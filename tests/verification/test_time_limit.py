@@ -145,6 +145,7 @@ def test_each_step_that_may_be_long_asks_the_clock() -> None:
     problem, rows = case(n=20)
     verify(problem.under(ErrorBox(1e-4)), rows, joint_error=True, deadline=clock)
     verify(case(0.0)[0].under(ErrorBox(0.03)), rows, deadline=clock)
+    verify(case(5.0)[0], rows, deadline=clock)
     look = Pointing(0.1, directions=np.eye(3)[:1])
     looking = replace(problem, tip_path=replace(problem.path, pointing=look))
     check_pointing(looking, replace(rows, on_path=~rows.on_path), clock)
@@ -154,6 +155,7 @@ def test_each_step_that_may_be_long_asks_the_clock() -> None:
         "YesOrNoProof.holds",
         "_look",
         "_smallest",
+        "arm_contacts.<locals>.judge",
         "arm_shapes.<locals>.shape",
         "check_cables",
         "check_fk",
