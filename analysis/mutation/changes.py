@@ -181,6 +181,21 @@ def _effects(tree: ast.Module) -> dict[int, tuple[int, ...]]:
             within = [k for m in methods for k in
                       range(m.body[0].lineno, (m.end_lineno or 0) + 1)]  # fmt: skip
             users.setdefault(statement.name, []).extend(within)
+    for statement in reversed(tree.body):  # what is made of a name is used later
+        if isinstance(statement, ast.ClassDef):
+            parts = [s for s in statement.body if not isinstance(s, ast.FunctionDef)]
+            given: tuple[str, ...] = (statement.name,)
+            used = [n for part in (*statement.bases, *parts) for n in ast.walk(part)]
+        elif isinstance(statement, ast.Assign | ast.AnnAssign):
+            used = [*ast.walk(statement)]
+            given = tuple(n.id for n in used if isinstance(n, ast.Name)
+                          and isinstance(n.ctx, ast.Store))  # fmt: skip
+        else:
+            continue
+        lines = {line for name in given for line in users.get(name, [])}
+        for node in used:
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                users[node.id].extend(lines)
     for node_id, names in _names(tree).items():
         found[node_id] = tuple(line for name in names for line in users.get(name, []))
     for function in ast.walk(tree):

@@ -148,6 +148,12 @@ def test_what_runs_at_import_has_its_effect_where_its_name_is_used(
     )
     (default,) = changes(tmp_path, "fields.py")
     assert (default.names, default.lines) == (("One",), (9, 5))
+    (tmp_path / "made.py").write_text(
+        "A = 7\nB = list[A]\n\n\nclass One:\n    x: B\n\n\n"
+        "class Two:\n    y: One\n\n\ndef one():\n    return Two\n"
+    )
+    (made,) = changes(tmp_path, "made.py")
+    assert {*made.lines} == {2, 6, 10, 14}
     other = tmp_path / "other.py"
     other.write_text("from module import SIZE\n\nTWICE = 2 * SIZE\n")
     assert uses(other, "module", ("SIZE",)) == (3,)
