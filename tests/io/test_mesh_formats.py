@@ -336,8 +336,9 @@ def test_glb_strips_and_fans_are_triangles_of_one_sense(tmp_path: Path) -> None:
     assert len(triangles_of(glb(last), tmp_path)) == 12
 
 
+DRACO = "KHR_draco_mesh_compression"
 GLB_DAMAGE = [
-    (setting("extensionsRequired", ["KHR_draco_mesh_compression"]), "requires the ext"),
+    (setting("extensionsRequired", [DRACO]), "requires the ext"),
     (setting("meshes", 0, "primitives", 0, "mode", 9), "glTF is damaged: Input should"),
     (
         setting("meshes", 0, "primitives", 0, "attributes", "POSITION", 99),
@@ -357,6 +358,11 @@ GLB_DAMAGE = [
     (setting("nodes", 0, {"mesh": 0, "weights": [0.5]}), "is bent by a skin or by"),
     (setting("nodes", 0, {"extensions": {"EXT_mesh_gpu_instancing": {}}}), "instanc"),
     (setting("scenes", 0, "nodes", []), "has no triangle"),
+    (setting("accessors", 0, "bufferView", None), "accessors[0] has no data"),
+    (
+        setting("meshes", 0, "primitives", 0, "extensions", {DRACO: {}}),
+        "is compressed",
+    ),
 ]
 
 
@@ -372,6 +378,45 @@ def test_damage_of_glb_is_named(
         read_mesh(path)
 
 
+def test_a_glb_without_its_json_is_refused(tmp_path: Path) -> None:
+    body = b"glTF" + (2).to_bytes(4, "little") + (20).to_bytes(4, "little")
+    path = write(tmp_path, "a.glb", body + bytes(4) + b"BIN\0")
+    with pytest.raises(InvalidFile, match="has no JSON chunk"):
+        read_mesh(path)
+
+
+def with_more(key: str, *more: dict) -> Callable[[dict], None]:
+    """Adds primitives, nodes or scenes to the first mesh or the document."""
+
+    def change(document: dict) -> None:
+        holder = document["meshes"][0] if key == "primitives" else document
+        holder[key] = [*holder.get(key, []), *more]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "notes"),
+    [
+        (with_more("primitives", {"mode": 1, "attributes": {"POSITION": 0}},
+                   {"mode": 0, "attributes": {}}), ("lines and points left out: 2",)),
+        (with_more("primitives", {"attributes": {}}), ()),
+        (with_more("nodes", {"mesh": 0}), ()),
+        (with_more("scenes", {"nodes": []}), ("one of 2 scenes is read",)),
+        (with_more("animations", {}),
+         ("its motion is not read: parts stand where their nodes do",)),
+        (lambda document: (document.pop("scenes"), document.pop("scene")), ()),
+    ],
+)  # fmt: skip
+def test_what_stands_beside_the_scene_of_a_glb_leaves_it_as_it_is(
+    tmp_path: Path, change: Callable[[dict], None], notes: tuple[str, ...]
+) -> None:
+    expected = triangles_of(glb(lambda _: None), tmp_path)
+    mesh = read_mesh(write(tmp_path, "a.glb", glb(change)))
+    assert mesh.notes == notes
+    np.testing.assert_array_equal(mesh.vertices[mesh.triangles], expected)
+
+
 PLY = (
     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
     "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
@@ -381,6 +426,13 @@ TEXT_DAMAGE = [
     ("a.ply", "plx\n", "line 1: is no header of a PLY file: 'plx'"),
     ("a.ply", PLY.replace("ascii", "asci"), "line 2: is no header of a PLY file"),
     ("a.ply", PLY.replace("float x", "float w"), "has no x, y, z of its vertices"),
+    (
+        "a.ply",
+        PLY.replace("ty float x", "ty list uchar float x").replace(
+            "d_header\n0 0 0\n1 0 0\n0 1 0", "d_header\n" + 3 * "2 0 0 0 0\n"
+        ),
+        "has lists where x, y and z are meant",
+    ),
     ("a.ply", PLY.replace("vertex 3", "vertex 4"), "has 4 values, 'vertex' has 3"),
     ("a.ply", PLY.replace("face 1", "face 2"), "promises 2 of 'face', has 1"),
     ("a.ply", f"{PLY}\n3 0 1 2", "announces: 3 of 'vertex', 1 of 'face'"),
@@ -424,6 +476,16 @@ TEXT_DAMAGE = [
     ("a.dae", dae(f"<node><scale>{'1e300 ' * 3}</scale></node>"), "that is not affine"),
     ("a.dae", dae('<node id="n"><instance_node url="#n"/></node>'), "nodes 100 deep"),
     ("a.dae", dae(HERE, root="<tristrips><p>0 1 2</p></tristrips>"), "names no vert"),
+    (
+        "a.dae",
+        dae(HERE).replace(TRIANGLES, "").replace("mesh>", "spline>"),
+        "has a <spline>, which is not read",
+    ),
+    (
+        "a.dae",
+        dae(HERE, root=f"<polygons>{INPUT}<ph><p>0 1 2</p></ph></polygons>"),
+        "has faces with holes (<ph>), which are not read",
+    ),
     ("a.dae", dae(HERE).replace("POSITION", "NORMAL"), "<vertices> without POSITION"),
     ("a.dae", dae(HERE).replace("accessor", "extra"), "has a source without accessor"),
 ]
