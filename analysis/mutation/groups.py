@@ -52,6 +52,7 @@ GROUPS: Final = (
             "tests/planner/paper/test_ratios.py",
             "tests/verification/test_half_laps.py",
             "tests/verification/test_other_arms.py",
+            "tests/robots/test_arm_and_robot.py",
             "tests/robots/test_trajectories.py",
         ),
     ),

@@ -30,6 +30,7 @@ ARM = {
     "max_link_angle_deg": 40,
     "max_joint_angle_deg": 40,
 }
+BALL = {"name": "b", "shape": "sphere", "radius": 9, "link": 1, "center": [0, 0, 0]}
 STRAIGHT = {"x0": 0, "alpha_deg": [0] * 8, "theta_deg": [0] * 8}
 NAN, INF = float("nan"), float("inf")
 
@@ -193,6 +194,21 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
         "joints (line 17): has a link angle psi of 54.07 deg at joint 3, the limit",
     ),
     (("manipulator",), ARM | {"link_lengths": [500]}, "expected at least 2 entries"),
+    (
+        ("manipulator",),
+        ARM | {"bodies": [BALL | {"link": 7}]},
+        "manipulator.bodies[0].link (line 19): is 7, expected 1 to 6",
+    ),
+    (
+        ("manipulator",),
+        ARM | {"bodies": [BALL | {"name": "tool"}]},
+        "bodies[0].name (line 16): is 'tool', which the arm's own is called",
+    ),
+    (
+        ("errors",),
+        {"obstacles": [{"name": "wall", "shift": 1}]},
+        "errors.obstacles[0].name (line 45): is 'wall', expected one of pillar",
+    ),
     (("manipulator",), ARM | {"link_lengths": [9] * 41}, "expected at most 40 entries"),
     (
         ("manipulator",),
@@ -323,6 +339,21 @@ NOT_PLAIN_YAML = [
     (b"a: " + b"{b: " * 100_000, "line 1: nests deeper than 32 levels"),
     (b"x: " + b"9" * 5_000 + b"\n", "is not a known key"),
 ]
+
+
+def test_a_half_space_has_no_middle_that_an_error_could_turn_it_about(
+    tmp_path: Path,
+) -> None:
+    wall = {"shape": "half_space", "point": [0, -9000, 0], "normal": [0, 1, 0]}
+    text = edited(OBS1, ("obstacles",), [{"name": "wall", **wall}])
+    for turn, said in ((0, None), (1, "errors.obstacles[0].turn_deg (line 48): is of")):
+        errors = {"obstacles": [{"name": "wall", "shift": 1, "turn_deg": turn}]}
+        changed = edited(text, ("errors",), errors)
+        if said is None:
+            (tmp_path / "p.yaml").write_text(changed)
+            assert read_problem(tmp_path / "p.yaml").errors.obstacles
+        else:
+            assert said in refused_text(tmp_path, changed)
 
 
 @pytest.mark.parametrize(("content", "expected"), NOT_PLAIN_YAML)

@@ -95,6 +95,10 @@ def test_directions_need_plain_points(tmp_path: Path) -> None:
     arc = "[[100, 3300, 300], {arc: {through: [100, 3300, 400], to: [0, 3300, 400]}}]"
     with pytest.raises(InvalidFile, match="no curves and files"):
         read(tmp_path, "{directions: [[1, 0, 0], [1, 0, 0]], cone_deg: 5}", arc)
+    twice = "[[100, 3300, 300], [100, 3300, 400], [100, 3300, 400]]"
+    with pytest.raises(InvalidFile, match="need points without repeats"):
+        each = "{directions: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], cone_deg: 5}"
+        read(tmp_path, each, twice)
     target = read(tmp_path, "{target: [100, 4000, 300], cone_deg: 5}", arc)
     assert target.pointing is not None
 

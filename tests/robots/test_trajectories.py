@@ -335,6 +335,60 @@ def test_times_are_seconds_or_durations_of_either_ros(
     assert found.times.tolist() == [0.0, pytest.approx(seconds, rel=1e-15)]
 
 
+SPIN = {
+    "translation": dict.fromkeys("xyz", 0.0),
+    "rotation": dict.fromkeys("xyz", 0.0) | {"w": 1.0},
+}
+ROW = {"positions": [0.0], "velocities": [0.0], "time_from_start": 1.0}
+
+
+def message(*points: object, free: list[object] | None = None) -> dict[str, object]:
+    """Of a joint, and of one of several degrees where there are points of it."""
+    one = {"joint_names": ["a"], "points": [*points]} if points else {}
+    other = {"joint_names": ["f"], "points": free}
+    return {"joint_trajectory": one, "multi_dof_joint_trajectory": other}
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ({"joint_names": ["a"], "points": {"a": 1}}, "points: is no list"),
+        (message({"positions": [10**400]}), "expected 1 finite numbers"),
+        (message(free=[{"transforms": []}]), "transforms: expected one for each of 1"),
+        (
+            message(free=[{"transforms": [SPIN], "velocities": [1]}]),
+            "has velocities of joints of several degrees, expected none",
+        ),
+        (
+            message(free=[{"transforms": [SPIN | {"rotation": {"w": 1}}]}]),
+            "rotation: is {'w': 1}, expected numbers x, y, z, w",
+        ),
+        (
+            message(free=[{"transforms": [SPIN | {"translation": [0, 0, 0]}]}]),
+            r"translation: is \[0, 0, 0\], expected numbers x, y, z",
+        ),
+        (
+            message({"positions": [0]}, free=2 * [{"transforms": [SPIN]}]),
+            "has 2 points beside 1 of joint_trajectory",
+        ),
+        (
+            message(ROW, free=[{"transforms": [SPIN]}]),
+            "has no velocities, but joint_trajectory has: leave them out",
+        ),
+        (
+            message(
+                ROW | {"velocities": []},
+                free=[{"transforms": [SPIN], "time_from_start": 2}],
+            ),
+            "has other times than joint_trajectory",
+        ),
+    ],
+)
+def test_odd_messages_are_refused(data: object, said: str) -> None:
+    with pytest.raises((InvalidFile, InvalidInput), match=said):
+        of_message(Place.of("t", data))
+
+
 ODD = {
     "turn_rad,slide_m,turn_velocity_rad_s\n0,0,0\n": "no column slide_velocity_m_s",
     "turn_rad,slide_m,turn_velocity_m_s,slide_velocity_m_s\n": "expected _rad or _deg",

@@ -235,5 +235,4 @@ def _is_empty(event: yaml.Event) -> bool:
 
 
 def _line(event: yaml.Event) -> int:
-    mark = event.start_mark
-    return mark.line + 1 if mark is not None else 0
+    return int(event.start_mark.line) + 1
