@@ -13,6 +13,7 @@ from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import problem_file, source, yaml_reader
 from vdsm_pin.io.problem_file import built_in_text, read_problem
+from vdsm_pin.problem.error_boxes import ErrorBox
 
 OBS1 = built_in_text("paper/obs1")
 PILLAR = {
@@ -339,6 +340,31 @@ NOT_PLAIN_YAML = [
     (b"a: " + b"{b: " * 100_000, "line 1: nests deeper than 32 levels"),
     (b"x: " + b"9" * 5_000 + b"\n", "is not a known key"),
 ]
+
+
+def test_a_prism_whose_ends_meet_in_the_frame_of_the_base_is_refused(
+    tmp_path: Path,
+) -> None:
+    sides = {"polygon": [[0, 0], [10, 0], [0, 10]], "from": 1.0}
+    bar = BAR | sides | {"to": 1.0 + 2.0**-52}
+    text = edited(OBS1, ("obstacles",), [bar])
+    (tmp_path / "p.yaml").write_text(text)
+    assert len(read_problem(tmp_path / "p.yaml").scene.obstacles) == 1
+    text = edited(text, ("base",), {"position": [1e5, 0, 0]})
+    said = "obstacles[0].to (line 10): is 1.0000000000000002, too near to from = 1.0"
+    assert said in refused_text(tmp_path, text)
+
+
+def test_what_is_not_stated_of_errors_is_none(tmp_path: Path) -> None:
+    for stated, expected in (
+        ({}, ErrorBox()),
+        ({"joint_deg": 0.5}, ErrorBox(joint=np.deg2rad(0.5))),
+        ({"base_deg": 0.5}, ErrorBox(base_turn=np.deg2rad(0.5))),
+        ({"base": 2}, ErrorBox(base=0.002)),
+        ({"obstacle": 2}, ErrorBox(obstacle=0.002)),
+    ):
+        (tmp_path / "p.yaml").write_text(edited(OBS1, ("errors",), stated))
+        assert read_problem(tmp_path / "p.yaml").errors == expected
 
 
 def test_a_half_space_has_no_middle_that_an_error_could_turn_it_about(

@@ -426,6 +426,7 @@ TEXT_DAMAGE = [
     ("a.ply", "plx\n", "line 1: is no header of a PLY file: 'plx'"),
     ("a.ply", PLY.replace("ascii", "asci"), "line 2: is no header of a PLY file"),
     ("a.ply", PLY.replace("float x", "float w"), "has no x, y, z of its vertices"),
+    ("a.ply", PLY.replace("list uchar", "list float"), "line 8: is no header of a PLY"),
     (
         "a.ply",
         PLY.replace("ty float x", "ty list uchar float x").replace(

@@ -156,7 +156,6 @@ def _tagged(kind: Any, tag: str = "") -> Iterator[tuple[str, type[FileModel]]]:
     if isinstance(kind, type) and issubclass(kind, FileModel):
         shape = kind.model_fields.get("shape")
         yield get_args(shape.annotation)[0] if shape else tag, kind
-        return
     parts = get_args(kind)
     for part in parts:
         tags = (one.tag for one in parts if isinstance(one, Tag))
