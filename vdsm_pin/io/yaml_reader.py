@@ -235,4 +235,5 @@ def _is_empty(event: yaml.Event) -> bool:
 
 
 def _line(event: yaml.Event) -> int:
-    return int(event.start_mark.line) + 1
+    assert event.start_mark is not None
+    return event.start_mark.line + 1
