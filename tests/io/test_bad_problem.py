@@ -62,6 +62,23 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
     (("name",), "a\nb", "name (line 2): is 'a\\nb', expected signs that can be seen"),
     (("name",), "\u202eb", "name (line 2): is '\\u202eb', expected signs that can be"),
     (("name",), "=1+2", "name (line 2): is '=1+2', expected signs that can be seen, "),
+    *(
+        (("errors",), {key: value}, said)
+        for key, value, said in (
+            (
+                "joint_deg",
+                [1, -1],
+                "errors.joint_deg[1] (line 46): is -1, expected 0 ",
+            ),
+            (
+                "joint_deg",
+                "1",
+                "is '1', expected a number, one for each joint, or some",
+            ),
+            ("slide", {"x": -1}, "errors.slide.x (line 45): is -1, expected 0 or more"),
+            ("slide", [1], "errors.slide (line 44): is [1], expected a number, or som"),
+        )
+    ),
     (("colour",), "red", "colour (line 43): is not a known key; known: vdsm_problem"),
     (("manipulator",), "hrm9", "manipulator (line 4): is 'hrm9'; known: hrm8"),
     (

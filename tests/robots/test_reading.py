@@ -157,6 +157,8 @@ def test_the_order_of_joints_and_groups_does_not_matter(tmp_path: Path) -> None:
         ('multiplier="2"', 'multiplier="1_0"', "expected a finite number"),
         ('offset="0.1"', 'offset="\u0661"', "expected a finite number"),
         ('radius="0.1"', 'radius="1_0"', "expected above 0"),
+        ('xyz="0 0 0.5"', 'xyz="0 0 1e200"', "expected 3 finite numbers"),
+        ('multiplier="2"', 'multiplier="1e300"', "expected a finite number"),
     ],
 )
 def test_numbers_are_those_that_every_program_reads(
@@ -322,7 +324,8 @@ def test_xacro_is_expanded(tmp_path: Path) -> None:
     np.testing.assert_array_equal(robot.tree.poses(q), plain.tree.poses(q))
     with pytest.raises(InvalidFile, match=r"macros\.xacro: .*it is of macros alone"):
         read_robot(RobotFiles(write(tmp_path, "macros.xacro", f"{head}</robot>")))
-    for bad in (text.replace("0.05 *", "length *"), text[:300]):
+    large = text.replace("0.05 *", "len('x' * 5 * 10**9) *")
+    for bad in (text.replace("0.05 *", "length *"), text[:300], large):
         with pytest.raises(InvalidFile, match="is not expanded by xacrodoc"):
             read_robot(RobotFiles(write(tmp_path, "two.urdf.xacro", bad)))
 

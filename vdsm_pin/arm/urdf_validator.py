@@ -32,7 +32,10 @@ ANY_SIZES: Final = {**SIZES, "capsule": {"radius": 1, "length": 1}, "mesh": {}}
 """Shapes of robots that are judged."""
 
 
-AXIS: Final = (1e-100, 1e100)
+LARGEST: Final = 1e100
+"""Numbers beyond this are slips, and their squares would overflow further on."""
+
+AXIS: Final = (1.0 / LARGEST, LARGEST)
 """Largest entry of a joint's axis, whose square is no overflow and not 0; [-]."""
 
 ONCE: Final = (
@@ -248,4 +251,5 @@ def _numbers(
     """The finite numbers in a child's attribute; None where they are not `count`."""
     words = _attribute(element, child, name).split()
     values = np.array([plain_number(word) for word in words])
-    return values if len(words) == count and np.isfinite(values).all() else None
+    good = len(words) == count and (np.abs(values) < LARGEST).all()
+    return values if good else None

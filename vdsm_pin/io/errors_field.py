@@ -1,6 +1,9 @@
 """How far things may be off in a problem file, of an arm or of any other robot."""
 
-from pydantic import Field
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import Discriminator, Field, Tag
 
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.io.schema_types import FileModel, Name, NotNegative
@@ -8,6 +11,18 @@ from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.error_boxes import ErrorBox, in_si
 from vdsm_pin.problem.scene import Scene, solid_of
 from vdsm_pin.units import UNITS_PER_METRE
+
+
+def _one_or_names(value: Any) -> str:
+    return "by name" if isinstance(value, Mapping) else "one"
+
+
+def _any_form(value: Any) -> str:
+    return "each" if isinstance(value, list) else _one_or_names(value)
+
+
+_One: TypeAlias = Annotated[NotNegative, Tag("one")]
+_ByName: TypeAlias = Annotated[dict[str, NotNegative], Tag("by name")]
 
 
 class ObstacleErrorModel(FileModel):
@@ -29,13 +44,16 @@ class ObstacleErrorModel(FileModel):
 class ErrorsModel(FileModel):
     """How far the real motion, its base and the obstacles may be off."""
 
-    joint_deg: NotNegative | list[NotNegative] | dict[str, NotNegative] = Field(
+    joint_deg: Annotated[
+        _One | Annotated[list[NotNegative], Tag("each")] | _ByName,
+        Discriminator(_any_form),
+    ] = Field(
         default=0.0,
         description="Of every alpha and theta, either way [deg]; a list has a value "
         "per joint, from the base. Of a robot: of every joint that turns, or of some "
         "by name.",
     )
-    slide: NotNegative | dict[str, NotNegative] = Field(
+    slide: Annotated[_One | _ByName, Discriminator(_one_or_names)] = Field(
         default=0.0,
         description="Of a robot: of every joint that slides, or of some by name "
         "[length_unit].",

@@ -19,6 +19,8 @@ _EITHER: Final[Mapping[str | int, str]] = {
     "start": "3 numbers or a mapping with joints",
     "retreat": "a number or home",
     "axis": "x, y, z or a list of 3 numbers",
+    "joint_deg": "a number, one for each joint, or some by name",
+    "slide": "a number, or some by name",
 }
 """What fields of two forms take."""
 

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from vdsm_pin.arm.urdf_validator import LARGEST
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.xml_reader import end, origin_of
@@ -246,7 +247,7 @@ class JointReader:
     def _number(self, element: ET.Element, name: str, default: float) -> float:
         word = element.get(name)
         value = default if word is None else plain_number(word)
-        if not np.isfinite(value):
+        if not abs(value) < LARGEST:
             problem = f"<{element.tag}> has {name}={word!r}, expected a finite number"
             raise self.invalid(problem)
         return value

@@ -14,15 +14,16 @@ from vdsm_pin.io.xml_reader import declared
 
 MAX_BYTES: Final = 16 << 20
 SCRIPT: Final = """
-import json, sys, xacro
+import json, resource, sys, xacro
 from xacrodoc.cli import main
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, resource.RLIM_INFINITY))
 try:
     main()
 finally:
     print()
     print(json.dumps(xacro.all_includes))
 """
-"""Expands a file, and prints in its last line which other files it has read."""
+"""Expands a file within 4 GiB, and prints in its last line which others it has read."""
 
 SLOWEST: Final = 60.0
 """How long an expansion may take; [s]."""
