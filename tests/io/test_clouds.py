@@ -60,6 +60,10 @@ FILES = {
     "a.xyz": lines(POINTS),
     "b.txt": b"# remark\n\n" + lines(POINTS, "\t") + b"// more\n",
     "c.csv": b"x,y,z\n" + lines(POINTS, ", "),
+    "mac.xyz": (lines(POINTS[:1]) + b"# one\n" + lines(POINTS[1:])).replace(
+        b"\n", b"\r"
+    ),
+    "next.csv": b"x,y,z\n# \xc3\x85 1 2 3\n" + lines(POINTS, ", "),
     "count.xyz": b"3\n" + lines(POINTS),
     "d.xyz": lines(np.hstack([POINTS, np.ones((3, 3))])),
     "e.pcd": pcd("ascii", lines(POINTS)),

@@ -110,6 +110,8 @@ def _npy(stream: MeshStream) -> FloatArray:
 def _text(stream: MeshStream) -> FloatArray:
     """Lines that begin with x y z; others stand behind # or // or are blank."""
     data = stream.content.read()
+    if b"\r" in data:  # which ends no remark for numpy
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     odd = b"," in data and (
         _DECIMAL_COMMA.search(data) is not None
         or len({line.count(b",") for line in io.BytesIO(data)} - {0}) > 1
@@ -130,7 +132,7 @@ def _text(stream: MeshStream) -> FloatArray:
 def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
     """The same where a line is odd: the first may be the number of points, or names."""
     rows, commas, announced = [], set[int](), ""
-    for number, whole in enumerate(data.decode("latin-1").splitlines(), 1):
+    for number, whole in enumerate(data.decode("latin-1").split("\n"), 1):
         line = whole.partition("#")[0].partition("//")[0].strip()
         words = _BETWEEN.split(line)
         mixed = "," in line and _DECIMAL_COMMA.search(line.encode())

@@ -1,6 +1,7 @@
 """The `.scene` text files of MoveIt, as the PlanningScene that they hold."""
 
 from collections.abc import Iterator
+from io import StringIO
 from math import isnan
 from pathlib import Path
 from typing import Any, Final
@@ -20,7 +21,7 @@ class _Words:
     """The words of a file, one after the other, and the line of each."""
 
     def __init__(self, file: Path, text: str) -> None:
-        self._file, self._lines = file, text.splitlines()
+        self._file, self._lines = file, StringIO(text, newline=None).readlines()
         self._words = self._split()
         self.line = 1
 
