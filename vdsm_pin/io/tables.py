@@ -273,8 +273,11 @@ def quoted(text: str) -> str:
 
 def split(line: str, between: str) -> list[str]:
     """The values of a line, without quotes and without blanks around them."""
+    plain = re.sub(rf'" +(?={between}|$)', '"', line.strip("\n"))
     try:
-        (words,) = csv.reader([line.strip("\n")], delimiter=between)
+        (words,) = csv.reader(
+            [plain], delimiter=between, skipinitialspace=True, strict=True
+        )
     except (csv.Error, ValueError):
         words = line.split(between)
     return [word.strip() for word in words]
