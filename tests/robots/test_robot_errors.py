@@ -314,7 +314,7 @@ def test_the_certificate_covers_errors_of_options(
         ("{slide: {turn: 1}}", (), "in degrees"),
         ("{obstacles: [{name: wall, shift: 1}]}", (), "expected one of ball, floor"),
         ("{joint_deg: {turn: -1}}", (), "0 or more"),
-        ("{}\ncolour: red", (), "known: length_unit, obstacles, vdsm_problem, name, r"),
+        ("{}\ncolour: red", (), "known: vdsm_problem, name, length_unit, base"),
         ("{shift: 1}", (), "errors.shift (line 5): is not a known key; known: joint_d"),
         ("{}", ("--joint-error-deg", "1,turn=2"), "before each number"),
         ("{}", ("--slide-error-mm", "1,2"), "JOINT=MM"),
