@@ -59,14 +59,14 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget, rounding_pad
-from vdsm_pin.proof.packing import pack_task
+from vdsm_pin.proof.error_box import ErrorBox as ProofBox
+from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import new_proving
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.task import with_growth
 
 FAR: Final = 1e-6
 """From here on a query must be decided; [m]."""
@@ -156,7 +156,11 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     )
     bodies = [*obstacles, *moving]
     task = pack_task(tree, bodies, table, rules, path.reach, pieces=pieces)
-    task = with_growth(task, errors, arm.n_links, [errors.obstacle] * len(obstacles))
+    joints, shifts, tilts = np.zeros((3, len(tree.joints)))
+    joints[1:], shifts[0] = errors.angles(arm.n_links).ravel(), errors.base
+    tilts[0], surfaces = errors.base_turn, np.zeros(len(bodies))
+    surfaces[: len(obstacles)] = errors.obstacle
+    task = with_errors(task, ProofBox(joints, shifts, tilts, surfaces))
     # No obstacle is named as such, so that none is settled by its box.
     proving = new_proving(task, path.packed(), 1, 0, BUDGET)
     proving.sweep(0, 1)

@@ -186,7 +186,7 @@ def measure(
         intervals=motion.n_samples - 1,
         pairs=len(proofs[0].pairs),
         triangles=sum(len(mesh.triangles) for mesh in meshes),
-        clearance_mm=float(proofs[0].best[:n_outer, 2].min()) / MM,
+        clearance_mm=float(proofs[0].least.upper[:n_outer].min()) / MM,
         not_certified=int(proofs[0].counts[:, 1:].sum()),
         cpu_ms=1e3 * seconds["median"],
         p95_ms=1e3 * seconds["p95"],

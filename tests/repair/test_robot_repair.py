@@ -75,8 +75,8 @@ def test_grazing_motion_is_repaired(tmp_path: Path) -> None:
     for a, b in pairwise(rows):
         for share in np.linspace(0.0, 1.0, 40):
             poses = this.robot.tree.poses((a + share * (b - a))[None])
-            all_poses = np.repeat(poses, len(this.pairs), axis=0)
-            table = this.pair_table
+            all_poses = np.repeat(poses, this.asked.table.size, axis=0)
+            table = this.asked.table
             distances = this.distances(table.one, table.other, all_poses)
             assert distances.min() >= 1e-3 - 5e-6
 
@@ -119,8 +119,8 @@ def test_smooth_motion_is_repaired_as_a_smooth_one(tmp_path: Path, degree: int) 
     base = given.path.at(motion.times)
     np.testing.assert_allclose(found.moved, np.abs(motion.q - base).max(axis=1))
     for q in motion.path.at(np.linspace(0.0, 4.0, 800)):
-        poses = np.repeat(this.robot.tree.poses(q[None]), len(this.pairs), axis=0)
-        table = this.pair_table
+        poses = np.repeat(this.robot.tree.poses(q[None]), this.asked.table.size, axis=0)
+        table = this.asked.table
         near = this.distances(table.one, table.other, poses)
         assert near.min() >= 1e-3 - 5e-6
     # As it is written it is the same motion.

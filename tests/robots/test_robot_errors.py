@@ -21,7 +21,6 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
@@ -243,8 +242,7 @@ def test_just_beyond_what_is_proved_is_refuted(robot: Robot, seed: int) -> None:
 def test_mimic_joints_err_by_their_ratio(robot: Robot) -> None:
     """The finger turns by half of what the joint before it does."""
     errors = TypedErrorBox(joint_deg=1.0, slide_mm=2.0)
-    box = proof_box(robot, Scene(), errors)
-    assert box is not None
+    box = Cell(robot, Scene()).asked.box(errors)
     expected = [0.0, np.radians(1.0), 0.002, np.radians(0.5)]
     np.testing.assert_allclose(box.joints, expected)
 

@@ -44,7 +44,7 @@ from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.records import Pair, Verdict
-from vdsm_pin.verification.task import ArmPairs
+from vdsm_pin.verification.task import arm_assembly
 from vdsm_pin.verification.verify import verify
 
 LENGTHS = np.array([0.5, 0.4, 0.4, 0.45])
@@ -112,9 +112,9 @@ def test_a_tool_is_held_off_the_link_before_its_own() -> None:
 
 def test_one_pair_is_named_as_among_all() -> None:
     balls = [solids.Sphere(name, np.array([9.0, 0, 0]), 0.1) for name in ("a", "b")]
-    pairs = ArmPairs(problem_with(arm_with(tool=TOOL), *balls))
-    assert {pair.obstacle for pair in pairs.pairs} == {"a", "b", ""}
-    assert [pairs.pair(k) for k in range(pairs.size)] == [*pairs.pairs]
+    asked = arm_assembly(problem_with(arm_with(tool=TOOL), *balls))
+    assert {pair.obstacle for pair in asked.pairs} == {"a", "b", ""}
+    assert [asked.pair(k) for k in range(asked.table.size)] == [*asked.pairs]
 
 
 @pytest.mark.parametrize("field", ["radius", "length"])

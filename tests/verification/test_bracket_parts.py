@@ -19,16 +19,11 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import (
-    AT_LOWER,
-    AT_UPPER,
-    BEST,
     CLAIM,
     FIRST,
     LAST,
-    LOW,
     PLANE_NORMAL,
     RECORD,
-    TIME,
 )
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import RANK
@@ -50,7 +45,6 @@ from vdsm_pin.verification.brackets import (
 from vdsm_pin.verification.clearance import (
     _merged,
     _steps,
-    profile_of,
     prove_clearance,
 )
 from vdsm_pin.verification.clearance_check import (
@@ -59,6 +53,7 @@ from vdsm_pin.verification.clearance_check import (
     Evidence,
     clearance_checks,
 )
+from vdsm_pin.verification.clearances import in_rows, profile_of
 from vdsm_pin.verification.coal_arm import CoalDistances, _Moved
 from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_missing import NEAR
@@ -132,17 +127,15 @@ def test_knots_lie_in_the_intervals_of_their_motion(seed: int) -> None:
         assert finer.moment == pytest.approx(np.append(np.concatenate(parts), n))
         knots, moments = finer, finer.moment
         counts = rng.integers(1, 3, len(moments) - 1)
-    best = rng.normal(size=(5, BEST))
-    best[:, [AT_LOWER, AT_UPPER]] = rng.integers(0, len(moments) - 1, (5, 2))
-    best[:, TIME] = rng.uniform(size=5)
-    found = knots.in_rows(best)
-    for row, told in zip(found, best, strict=True):
-        k = int(told[AT_UPPER])
-        at = moments[k] + told[TIME] * (moments[k + 1] - moments[k])
-        assert row[AT_UPPER] + row[TIME] == pytest.approx(at)
-        assert row[AT_UPPER] == knots.interval(np.array([k]))[0]
-        rest = np.delete(told, [AT_LOWER, AT_UPPER, TIME])
-        assert np.array_equal(np.delete(row, [AT_LOWER, AT_UPPER, TIME]), rest)
+    inner, share = rng.integers(0, len(moments) - 1, 5), rng.uniform(size=5)
+    rest = [rng.normal(size=5) for _ in range(5)]
+    given = LeastClearances(inner, share, *rest)  # type: ignore[arg-type]
+    found = in_rows(given, knots)
+    at = moments[inner] + share * (moments[inner + 1] - moments[inner])
+    assert found.interval + found.share == pytest.approx(at)
+    assert np.array_equal(found.interval, knots.interval(inner))
+    for name in ("lower", "upper", "verdict", "link_point", "other_point"):
+        assert getattr(found, name) is getattr(given, name)
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])
@@ -365,10 +358,10 @@ def test_bounds_are_kept_where_they_fit(
         sink.keep(replace(part, pairs=pairs))
     for sent in (5, 4):
         proof: Any = SimpleNamespace(
-            best=rng.normal(size=(8, BEST)), sent=sent, n_intervals=5
+            least=SimpleNamespace(lower=rng.normal(size=8)), sent=sent, n_intervals=5
         )
         found = sink.proved(proof)
-        assert np.array_equal(found.least, proof.best[:, LOW])
+        assert np.array_equal(found.least, proof.least.lower)
         if spare or sent < 5:
             assert (found.column == -1).all()
             assert found.lower.shape == (1, 1)

@@ -85,19 +85,21 @@ def test_brackets_hold_a_dense_estimate(seed: int) -> None:
     if apart:
         # A thousandth of an interval away from the least place nothing rises by 10 um.
         assert (chunk.upper[:, :8] >= least - 1e-5).all()
-        assert proof.best[:8, 2].min() >= least.min() - 1e-7
-        assert proof.best[:8, 0].min() >= least.min() - 2e-6
+        assert proof.least.upper[:8].min() >= least.min() - 1e-7
+        assert proof.least.lower[:8].min() >= least.min() - 2e-6
     assert (proof.counts.sum(axis=1) == 5).all()
-    assert np.isfinite(proof.best[:, :11]).all()
+    for name in ("lower", "upper", "share", "link_point", "other_point"):
+        assert np.isfinite(getattr(proof.least, name)).all()
 
 
 def test_the_least_bracket_is_narrow_and_its_witness_real() -> None:
     problem, rows = problem_with(SPHERE, required=0.001), motion(11, size=0.03)
     proof, _ = prove(problem, rows)
-    row = proof.best[int(np.argmin(proof.best[:8, 2]))]
-    assert 0.0 <= row[2] - proof.best[:8, 0].min() <= 2e-6
-    assert np.linalg.norm(row[5:8] - row[8:11]) == pytest.approx(row[2], abs=1e-8)
-    assert np.linalg.norm(row[8:11] - SPHERE.centre) == pytest.approx(0.2, abs=1e-8)
+    least, k = proof.least, int(np.argmin(proof.least.upper[:8]))
+    upper, own, other = least.upper[k], least.link_point[k], least.other_point[k]
+    assert 0.0 <= upper - least.lower[:8].min() <= 2e-6
+    assert np.linalg.norm(own - other) == pytest.approx(upper, abs=1e-8)
+    assert np.linalg.norm(other - SPHERE.centre) == pytest.approx(0.2, abs=1e-8)
 
 
 def test_a_waypoint_pushed_in_by_a_tenth_of_a_millimetre_is_refuted_there() -> None:
@@ -113,7 +115,7 @@ def test_a_waypoint_pushed_in_by_a_tenth_of_a_millimetre_is_refuted_there() -> N
     proof, (chunk,) = prove(problem, trajectory(x0, still.alpha, still.theta))
     assert sorted(np.unique(np.nonzero(chunk.verdict == 1)[0])) == [12, 13]
     assert proof.counts[7, 1] == 2
-    assert proof.best[7, 2] == pytest.approx(gap - 1e-4, abs=1e-9)
+    assert proof.least.upper[7] == pytest.approx(gap - 1e-4, abs=1e-9)
 
 
 def test_a_corner_cut_between_clear_rows_is_refuted_between_them() -> None:
@@ -130,7 +132,7 @@ def test_a_corner_cut_between_clear_rows_is_refuted_between_them() -> None:
     pair = 5  # link 6 lies over x = 2.43 to 2.636
     assert chunk.verdict[0, pair] == 1
     assert 0.3 < chunk.share[0, pair] < 0.7
-    assert proof.best[pair, 2] < 0.0
+    assert proof.least.upper[pair] < 0.0
 
 
 def test_refining_a_motion_never_worsens_the_verdict() -> None:
@@ -148,7 +150,7 @@ def test_a_larger_obstacle_never_raises_a_lower_bound_past_an_upper_one() -> Non
     rows = motion(3)
     small, _ = prove(problem_with(SPHERE), rows)
     large, _ = prove(problem_with(replace(SPHERE, radius=0.22)), rows)
-    assert (large.best[:8, 0] <= small.best[:8, 2] - 0.02 + 1e-9).all()
+    assert (large.least.lower[:8] <= small.least.upper[:8] - 0.02 + 1e-9).all()
 
 
 def test_turning_everything_about_the_rail_changes_nothing() -> None:
@@ -166,8 +168,12 @@ def test_turning_everything_about_the_rail_changes_nothing() -> None:
     turned = replace(bar, centre=turn @ bar.centre, axis=turn @ bar.axis)
     before, _ = prove(problem_with(bar), flat)
     after, _ = prove(problem_with(turned), tilted)
-    assert before.best[:8, 2].min() == pytest.approx(after.best[:8, 2].min(), abs=2e-6)
-    assert before.best[:8, 0].min() == pytest.approx(after.best[:8, 0].min(), abs=2e-6)
+    assert before.least.upper[:8].min() == pytest.approx(
+        after.least.upper[:8].min(), abs=2e-6
+    )
+    assert before.least.lower[:8].min() == pytest.approx(
+        after.least.lower[:8].min(), abs=2e-6
+    )
 
 
 def test_the_error_box_covers_perturbed_motions() -> None:
@@ -176,7 +182,7 @@ def test_the_error_box_covers_perturbed_motions() -> None:
     rows, problem = motion(5, size=0.05), problem_with(SPHERE)
     robust, (chunk,) = prove(problem, rows, errors)
     nominal, _ = prove(problem, rows)
-    assert (robust.best[:, 0] < nominal.best[:, 2]).all()
+    assert (robust.least.lower < nominal.least.upper).all()
     fine = dense(rows, 50)
     for _ in range(40):
         sign = rng.choice([-1.0, 1.0], (2, 8))
@@ -205,7 +211,8 @@ def test_culled_pairs_are_bounded_too() -> None:
         pairs = slice(8 * k, 8 * k + 8)
         assert (chunk.lower[:, pairs] <= least + 1e-11).all()
         assert (chunk.upper[:, pairs] >= least - 1e-4).all()
-    assert np.isfinite(proof.best[:, :11]).all()
+    for name in ("lower", "upper", "share", "link_point", "other_point"):
+        assert np.isfinite(getattr(proof.least, name)).all()
     assert np.isfinite(proof.profile.obstacle_upper).all()
 
 

@@ -27,7 +27,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.arm_counterexamples import find_counterexamples
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_pairs import arm_shapes
@@ -249,7 +248,7 @@ def test_no_error_is_both_certified_and_refuted(shape: str, seed: int) -> None:
     for error in (0.5 * certified, certified, 2.0 * certified):
         asked = replace(box, joint=error)
         proof = prove_clearance(problem, rows, asked)
-        found = find_counterexamples(problem, rows, asked, proof)
+        found = proof.counterexamples(asked)
         if found and not proof.counts[:, 1].any():
             assert error > certified
             assert found[0].clearance < 0.001

@@ -17,7 +17,6 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import LOW, UP
 from vdsm_pin.report.solids import detail, surface
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_check import check_coal
@@ -51,9 +50,11 @@ def test_a_cloud_is_as_far_as_its_nearest_part(seed: int) -> None:
     boxes = [Box(f"b{k}", p, TURN, HALF) for k, p in enumerate(points)]
     whole = PointCloud("c", points, 0.02), Voxels("v", points, TURN, HALF)
     for one, parts in zip(whole, (balls, boxes), strict=True):
-        apart = prove_clearance(problem(*parts), rows, none).best[: 8 * 60, [LOW, UP]]
-        least = apart.reshape(60, 8, 2).min(axis=0)
-        found = prove_clearance(problem(one), rows, none).best[:8, [LOW, UP]]
+        apart = prove_clearance(problem(*parts), rows, none).least
+        bounds = np.stack([apart.lower, apart.upper], axis=1)[: 8 * 60]
+        least = bounds.reshape(60, 8, 2).min(axis=0)
+        proved = prove_clearance(problem(one), rows, none).least
+        found = np.stack([proved.lower, proved.upper], axis=1)[:8]
         # Brackets of the same number overlap, and the least is narrow.
         assert (found[:, 0] <= least[:, 1] + 1e-9).all()
         assert (least[:, 0] <= found[:, 1] + 1e-9).all()

@@ -17,16 +17,11 @@ from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import AT_UPPER, BEST, OTHER, OWN, TIME, UP
+from vdsm_pin.proof.prover import verdicts_of
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
-from vdsm_pin.verification import arm_counterexamples, counterexample
-from vdsm_pin.verification.arm_counterexamples import (
-    MOST_MEETINGS,
-    erring_pair,
-    find_counterexamples,
-    with_meetings,
-)
-from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification import clearances, counterexample
+from vdsm_pin.verification.brackets import LeastClearances
+from vdsm_pin.verification.clearance import MOST_MEETINGS, prove_clearance
 from vdsm_pin.verification.contacts import BESIDE, MEETING
 from vdsm_pin.verification.counterexample import (
     GRID,
@@ -38,8 +33,10 @@ from vdsm_pin.verification.counterexample import (
     grown_by,
     moments_of,
 )
+from vdsm_pin.verification.counterexamples import erring_pair
 from vdsm_pin.verification.records import Counterexample, Pair, Verdict
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
+from vdsm_pin.verification.task import arm_assembly
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
 
@@ -73,7 +70,7 @@ def checked(
 ) -> tuple[Counterexample, ...]:
     """Counterexamples, each evaluated again from its numbers alone."""
     proof = prove_clearance(problem, rows, box)
-    found = find_counterexamples(problem, rows, box, proof)
+    found = proof.counterexamples(box)
     for one in found:
         k, q = one.interval, rows.joints
         assert 0 <= k <= max(0, len(q) - 2)
@@ -199,9 +196,7 @@ def test_links_that_errors_bring_together_are_refuted() -> None:
     errors = bracketed(problem, rows)
     assert errors.certified > 0.0
     box = ErrorBox(joint=1.01 * errors.refuted)
-    (found,) = find_counterexamples(
-        problem, rows, box, prove_clearance(problem, rows, box)
-    )
+    (found,) = prove_clearance(problem, rows, box).counterexamples(box)
     assert found.pair.other_link > found.pair.link
     assert found.clearance < 0.05
 
@@ -251,52 +246,54 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
     rows = motion(n_rows)
     proof = prove_clearance(problem_with(ceiling(0.1)), rows, ErrorBox())
     counts = rng.integers(0, 2, (n, 3)) * rng.integers(1, 4, (n, 3))
-    best = rng.uniform(-1.0, 1.0, (n, BEST))
-    best[:, UP] = rng.choice([0.5, 2.0, 0.0, -1.0], n) * MEETING
-    best[:, AT_UPPER] = rng.integers(0, n_rows - 1, n)
-    best[:, TIME] = rng.choice([0.0, 0.3, 1.0], n)
+    upper = rng.choice([0.5, 2.0, 0.0, -1.0], n) * MEETING
+    shares = rng.choice([0.0, 0.3, 1.0], n)
+    numbers, points = rng.integers(0, n_rows - 1, n), rng.normal(size=(2, n, 3))
+    lower = rng.uniform(-1.0, 1.0, n)
+    least = LeastClearances(
+        numbers, shares, lower, upper, verdicts_of(counts), points[0], points[1]
+    )
     radii = {k: rng.choice([0.0, 0.25], len(BESIDE)) for k in range(n)}
-    asked = list[tuple[int, FloatArray, FloatArray]]()
+    left = {k: iter(radii[k].tolist()) for k in range(n)}
+    asked = list[tuple[int, float]]()
 
-    def asked_of(problem: Any, trajectory: Any, k: int, errors: ErrorBox) -> Any:
-        assert errors == ErrorBox()
-        left = iter(radii[k].tolist())
+    def ball(k: int, at: float, middle: FloatArray, _: float) -> tuple[float, Any]:
+        asked.append((k, at))
+        return next(left[k]), middle + at
 
-        def common_ball(q: float, middle: FloatArray) -> tuple[float, FloatArray]:
-            asked.append((k, np.array(q), middle))
-            return next(left), middle + q
-
-        return SimpleNamespace(rows=lambda moments: moments, common_ball=common_ball)
-
-    monkeypatch.setattr(arm_counterexamples, "erring_pair", asked_of)
-    given = replace(proof, pairs=tuple(range(n)), counts=counts, best=best)
-    told: Any = given
-    found = with_meetings(problem_with(), rows, replace(told, n_intervals=n_rows - 1))
-    wanted, rest = best.copy(), counts.copy()
-    expected = list[tuple[int, float]]()
-    met = 0
+    monkeypatch.setattr(clearances, "common_ball", ball)
+    held: Any = SimpleNamespace(poses=list, placed=lambda k, at: (k, at))
+    path: Any = SimpleNamespace(
+        n_intervals=n_rows - 1,
+        split=proof.path.split,
+        within=lambda k, share: k + share,
+    )
+    given = replace(proof, asked=held, path=path, inner=least, counts=counts)
+    found = given.with_meetings()
+    wanted, rest = [upper.copy(), points.copy()], counts.copy()
+    expected, met = list[tuple[int, float]](), 0
     for k in range(n):
-        near = best[k, UP] <= MEETING
+        near = upper[k] <= MEETING
         if not (counts[k, UNDECIDED] and not counts[k, REFUTED] and near):
             continue
         met += 1
         if met > MOST_MEETINGS:
             continue
-        middle = (best[k, OWN:OTHER] + best[k, OTHER:]) / 2.0
+        middle = points[:, k].mean(axis=0)
         for off, radius in zip(BESIDE, radii[k], strict=True):
-            moment = best[k, AT_UPPER] + best[k, TIME] + off
-            moment = min(max(moment, 0.0), n_rows - 1.0)
+            moment = min(max(numbers[k] + shares[k] + off, 0.0), n_rows - 1.0)
             expected.append((k, moment))
-            if radius:
-                interval = min(int(moment), n_rows - 2)
-                wanted[k, UP:OWN] = -radius, interval, moment - interval
-                wanted[k, OWN:] = [*(middle + moment)] * 2
+            if radius > max(0.0, -upper[k]):
+                wanted[0][k], wanted[1][:, k] = -radius, middle + moment
                 rest[k, REFUTED] += 1
                 rest[k, UNDECIDED] -= 1
                 break
-    assert [(k, float(q)) for k, q, _ in asked] == expected
+    assert [k for k, _ in asked] == [k for k, _ in expected]
+    np.testing.assert_allclose([at for _, at in asked], [at for _, at in expected])
     np.testing.assert_array_equal(found.counts, rest)
-    np.testing.assert_array_equal(found.best, wanted)
+    np.testing.assert_array_equal(found.inner.upper, wanted[0])
+    np.testing.assert_allclose(found.inner.link_point, wanted[1][0])
+    np.testing.assert_allclose(found.inner.other_point, wanted[1][1])
     assert 0 < met and (rest != counts).any()
 
 
@@ -308,7 +305,9 @@ def test_a_configuration_is_judged_by_its_proof_or_a_ball_in_both(
 ) -> None:
     rows, box = motion(4), ErrorBox(joint=0.01, base=0.003)
     problem = problem_with(ceiling(0.1))
-    asked = erring_pair(problem, rows, Pair(5, "ceiling"), box)
+    held = arm_assembly(problem)
+    number = held.pairs.index(Pair(5, "ceiling"))
+    asked = erring_pair(held, rows.path.at_moments, number, box)
     search, limit = Search(asked), 0.002 + 0.003
     assert search.limit == pytest.approx(limit) and asked.ball == ARM.link_radius
     points = np.array([[1.0, 2, 3], [4, 6, 8]])

@@ -17,7 +17,6 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import LOW, UP
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import arithmetic_pad, link_clearance
@@ -67,7 +66,8 @@ def test_each_link_is_as_near_as_is_proved(name: str, tmp_path: Path) -> None:
             assert alone == pytest.approx(nearest, abs=TOLERANCES.bracket_gap)
             mine = [k for k, pair in enumerate(proof.pairs)
                     if pair.obstacle and pair.link == link]  # fmt: skip
-            low, high = (float(proof.best[mine, at].min()) for at in (LOW, UP))
+            found = proof.least
+            low, high = (float(x[mine].min()) for x in (found.lower, found.upper))
             if high <= 0.0:
                 assert nearest <= 0.0
                 continue

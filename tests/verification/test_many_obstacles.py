@@ -17,7 +17,6 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_arm, coal_check, robust
 from vdsm_pin.verification.brackets import ClearanceChunk
@@ -51,9 +50,9 @@ def swaying(n_rows: int = 60) -> Trajectory:
 
 
 def lowers(problem: PlanningProblem, motion: Trajectory) -> np.ndarray:
-    best = prove_clearance(problem, motion, ErrorBox()).best
+    lower = prove_clearance(problem, motion, ErrorBox()).least.lower
     n = len(problem.scene.obstacles)
-    return np.asarray(best[: 8 * n, LOW].reshape(n, 8).min(axis=1))
+    return np.asarray(lower[: 8 * n].reshape(n, 8).min(axis=1))
 
 
 @pytest.mark.parametrize("seed", range(6))

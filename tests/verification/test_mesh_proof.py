@@ -99,7 +99,7 @@ def test_the_hierarchy_is_not_walked_for_every_row() -> None:
 def test_the_least_clearance_in_a_tunnel_is_exact() -> None:
     mesh, rows = tunnel(0.55), swaying(150)
     proof = prove_clearance(problem_of(mesh), rows, ErrorBox())
-    low, up = proof.best[:N, 0].min(), proof.best[:N, 2].min()
+    low, up = proof.least.lower[:N].min(), proof.least.upper[:N].min()
     assert up - low <= TOLERANCES.least_bracket
     sampled = clearances(mesh, rows, np.linspace(0.0, rows.n_samples - 1.0, 1490))
     assert low - 1e-9 <= sampled.min() <= up + 1e-4

@@ -12,7 +12,6 @@ from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Carrier, Moving, Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.tree import free_tree
 from vdsm_pin.verification.clearance import prove_clearance
@@ -70,7 +69,7 @@ def compare(seed: int) -> None:
     centre, radius = rng.normal(0.0, 0.1, 3), float(rng.uniform(0.02, 0.15))
     ball = Moving(Sphere("ball", centre, radius), carrier, 6)
     problem = PlanningProblem("p", arm, Scene((ball,)), None, 0.005, np.eye(4))
-    lower = prove_clearance(problem, motion, box).best[:3, LOW]
+    lower = prove_clearance(problem, motion, box).least.lower[:3]
 
     moments = rng.uniform(0.0, motion.n_samples - 1, SAMPLES)
     ends = rng.choice([-1.0, 1.0], (SAMPLES, 7))

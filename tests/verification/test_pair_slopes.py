@@ -12,7 +12,6 @@ from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
 from vdsm_pin.geometry.solids import Box, Capsule, HalfSpace, Mesh, Sphere
 from vdsm_pin.problem.desired_path import DesiredPath
-from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.proof.bodies import Body, PairTable
@@ -21,7 +20,7 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import start_proof
 from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import Pair
-from vdsm_pin.verification.task import all_pairs, make_task
+from vdsm_pin.verification.task import arm_assembly
 
 ARM = built_in("hrm8")
 GOAL, STEP = 1e-11, 1e-6
@@ -64,8 +63,9 @@ def asked(scene: Scene, pair: Pair, q: FloatArray) -> tuple[FloatArray, FloatArr
     tip = np.array([ARM.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
     problem = PlanningProblem("p", ARM, scene, path, 0.0, np.eye(4))
-    number = all_pairs(problem).index(pair)
-    return pair_slopes(make_task(problem, ErrorBox()), number, q)
+    assembly = arm_assembly(problem)
+    task = assembly.question.about(Path(q[:1])).task
+    return pair_slopes(task, assembly.pairs.index(pair), q)
 
 
 def differences(gaps: list[FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -12,7 +12,7 @@ from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, LOW
+from vdsm_pin.proof.layouts import BEST, LOW
 from vdsm_pin.proof.terms import UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
@@ -217,22 +217,30 @@ def test_the_pairs_left_open_that_are_nearest_are_searched(
     rng = np.random.default_rng(seed)
     n, asked, swept = int(rng.integers(0, 9)), list[int](), list[tuple[int, int]]()
     counts, best = rng.integers(0, 2, (n, 3)), rng.normal(size=(n, BEST))
-    best[:, AT_UPPER] = best[:, AT_LOWER] = 1.0
     errors = {k: None if rng.random() < 0.4 else rng.normal(size=17) for k in range(n)}
     proving = SimpleNamespace(
         n_intervals=7, results=SimpleNamespace(counts=counts),
         sweep=lambda *interval: swept.append(interval),
     )  # fmt: skip
-    proof = SimpleNamespace(proving=proving, best=best)
+    held = SimpleNamespace(pair=lambda k: k)
+    least = SimpleNamespace(lower=best[:, LOW], lower_interval=np.ones(n, int))
+    proof = SimpleNamespace(
+        asked=held,
+        proving=proving,
+        told=lambda: least,
+        knots=SimpleNamespace(interval=lambda inner: inner),
+        rows=None,
+    )
 
     def search(k: int) -> Any:
         asked.append(k)
         found = None if errors[k] is None else SimpleNamespace(offsets=errors[k])
         return SimpleNamespace(smallest=lambda moments: found)
 
-    pairs = SimpleNamespace(pair=lambda k: k)
     monkeypatch.setattr(robust, "prove_problem", lambda *_, **__: proof)
-    monkeypatch.setattr(robust, "ArmPairs", lambda _: pairs)
+    monkeypatch.setattr(robust, "least_clearances", lambda *_: least)
+    monkeypatch.setattr(robust, "in_rows", lambda *_: least)
+    monkeypatch.setattr(robust, "starts", lambda *_: ())
     monkeypatch.setattr(robust, "erring_pair", lambda *args: args[2])
     monkeypatch.setattr(robust, "Search", search)
     told: Any = None

@@ -23,7 +23,6 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import LOW, UP
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
@@ -122,7 +121,7 @@ def test_a_limit_at_any_moment_claims_no_more_than_was_proved() -> None:
         left = found.counts[:, 2] > whole.counts[:, 2]
         assert found.late or not left.any()
         partly += bool(0 < found.counts[:, 0].sum() < whole.counts[:, 0].sum())
-        lower, least = found.best[:, LOW], whole.best[:, UP]
+        lower, least = found.least.lower, whole.least.upper
         assert (lower <= least + 1e-9).all()
         assert (lower[left] == -np.inf).all()
         assert sum(len(chunk.lower) for chunk in chunks) == found.sent

@@ -41,7 +41,7 @@ class RobotSubject:
     @property
     def n_pairs(self) -> int:
         """Number of pairs that are judged."""
-        return len(self.problem.pairs)
+        return self.problem.asked.table.size
 
     def read(self, file: Path) -> JointTrajectory:
         """Read the motion of a file."""

@@ -3,7 +3,7 @@
 The format is docs/certificate.md.
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -21,19 +21,18 @@ from vdsm_pin.certificate_writer.lines import (
 )
 from vdsm_pin.certificate_writer.links import links_of_others
 from vdsm_pin.certificate_writer.schema import ErrorLimits, HeaderLine, Pair
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import ConvexCover, Mesh, Prism, Solid
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene, solid_of, with_hulls
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.terms import Task
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.moving import whole_path
 from vdsm_pin.verification.records import ArmVerification
-from vdsm_pin.verification.task import all_pairs, make_task
+from vdsm_pin.verification.task import all_pairs, arm_assembly
 
 
 def write_certificate(
@@ -60,19 +59,29 @@ def write_certificate(
     # Of a mesh without known inside the hull is proved clear, by planes for all of it.
     hulls = unlocated(locate_start(problem, trajectory))
     scene = with_hulls(problem.scene, hulls)
-    asked, budget = replace(problem, scene=scene), Budget(until=deadline.end)
-    motion, _ = whole_path(asked, trajectory)
-    task = make_task(asked, verification.errors, budget=budget, reach=motion.reach)
-    header = _header(verification, hashes, task.pieces)
-    whole = _whole(problem, task, hulls)
-    write_lines(path, header, Recorded(task, motion.packed(), whole), deadline)
+    hulled = replace(problem, scene=scene)
+    asked, motion = arm_assembly(hulled), whole_path(hulled, trajectory)[0]
+    question = asked.question.under(asked.box(verification.errors))
+    proving = question.about(motion, Budget(until=deadline.end))
+    places = question.places[len(asked.own) :]
+    header = _header(verification, hashes, proving.task.pieces, places)
+    whole = np.zeros(len(proving.task.pieces.root), np.int64)
+    for place, one in zip(places, problem.scene.obstacles, strict=True):
+        whole[place] = len(one.pieces) if one.name in hulls else 0
+    proof = Recorded(proving.task, proving.motion, whole)
+    write_lines(path, header, proof, deadline)
 
 
 def _header(
-    verification: ArmVerification, hashes: Hashes, pieces: PackedPieces
+    verification: ArmVerification,
+    hashes: Hashes,
+    pieces: PackedPieces,
+    places: Sequence[int],
 ) -> HeaderLine:
+    """The header; `places` are those of the obstacles among the packed bodies."""
     problem, trajectory = verification.problem, verification.trajectory
     box = verification.errors
+    obstacles = [*zip(places, problem.scene.obstacles, strict=True)]
     return HeaderLine(
         **hashes.as_json(),
         errors=ErrorLimits(
@@ -81,9 +90,9 @@ def _header(
         ),
         interpolation=trajectory.interpolation,
         pairs=_pairs(problem),
-        pieces=_pieces(problem, pieces),
+        pieces=pieces_of_obstacles(obstacles, pieces) | _pieces_carried(problem),
         joined=joined_corners(problem.scene),
-        links=links_of_others([*enumerate(problem.scene.obstacles)], pieces),
+        links=links_of_others(obstacles, pieces),
     )
 
 
@@ -104,9 +113,9 @@ def _pairs(problem: PlanningProblem) -> list[Pair]:
     ]
 
 
-def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[Any]]:
+def _pieces_carried(problem: PlanningProblem) -> dict[str, list[Any]]:
     """As of obstacles; of a mesh on a link the triangles under each hull."""
-    result = pieces_of_obstacles(enumerate(problem.scene.obstacles), pieces)
+    result: dict[str, list[Any]] = {}
     for body in problem.manipulator.bodies:
         if isinstance(body.solid, Prism) and len(body.solid.convex_sections) > 1:
             result[body.name] = _triangles(body.solid)
@@ -181,12 +190,3 @@ def _sense(polygon: FloatArray) -> int:
     corners = [(Fraction(x), Fraction(y)) for x, y in polygon.tolist()]
     edges = pairwise([*corners, corners[0]])
     return 1 if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges) > 0 else -1
-
-
-def _whole(problem: PlanningProblem, task: Task, hulls: Collection[str]) -> IntArray:
-    """Pieces of each obstacle whose hull is proved clear: one plane serves them all."""
-    whole = np.zeros(len(task.pieces.root), np.int64)
-    for k, obstacle in enumerate(problem.scene.obstacles):
-        if obstacle.name in hulls:
-            whole[k] = len(obstacle.pieces)
-    return whole

@@ -32,7 +32,7 @@ from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.errors import joint_errors, proof_box
+from vdsm_pin.robots.errors import joint_errors
 from vdsm_pin.robots.files import HULLS
 from vdsm_pin.robots.inside import at_start, question_of_hulls, unlocated_pairs
 from vdsm_pin.robots.judgement import RobotVerification
@@ -63,18 +63,15 @@ def write_robot_certificate(
     """
     check_certified(verification)
     cell, motion = verification.problem, verification.trajectory
-    bodies, errors = cell.bodies, verification.errors
+    bodies, errors = cell.asked.bodies, verification.errors
     whole, _ = joined_path(motion, cell.scene)
     # Of a mesh without known inside the hull is proved clear, by planes for all of it.
     hulled = unlocated_pairs(at_start(cell, whole))
-    box = proof_box(cell.robot, cell.scene, errors)
-    asked = question_of_hulls(cell, hulled, box) if hulled else cell.question
+    asked = question_of_hulls(cell, hulled, errors) if hulled else cell.question
     proving, plan = asked.about(whole, Budget(until=deadline.end)), asked.plan
     pieces, n_links = proving.task.pieces, len(cell.robot.bodies)
-    meshes = dict.fromkeys(cell.pairs[k].one for k in hulled)
-    n_bodies = len(bodies) + len(meshes)
-    # Where each body as it was given stands among those that were packed.
-    places = np.argsort(plan.number[:n_bodies], kind="stable").tolist()
+    meshes = dict.fromkeys(cell.asked.table.one[hulled].tolist())
+    n_bodies, places = len(bodies) + len(meshes), asked.places
     of_obstacles = places[n_links : len(bodies)]
     obstacles = [*zip(of_obstacles, cell.scene.obstacles, strict=True)]
     header = RobotHeaderLine(

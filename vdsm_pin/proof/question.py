@@ -1,7 +1,7 @@
 """What is asked of every motion of a tree: bodies and pairs, packed once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,7 @@ class Question:
         plan: How the pairs are asked.
         n_pairs: Their number.
         task: The same as compiled code reads it, without errors and of no motion.
+        number: The body as it was given that each packed one is or is a part of.
         errors: Of joints, placements and of the packed bodies' surfaces.
         n_columns: Columns of a profile.
         extent: Bound of all lengths and coordinates where q is 0; [m].
@@ -37,6 +38,7 @@ class Question:
     plan: PartPlan
     n_pairs: int
     task: Task
+    number: IntArray
     errors: ErrorBox
     n_columns: int
     extent: float
@@ -49,8 +51,12 @@ class Question:
         pairs: PairTable,
         errors: ErrorBox | None = None,
         columns: IntArray | None = None,
+        packed: PackedPieces | None = None,
     ) -> "Question":
         """Pack it; arguments as for `prove`.
+
+        `packed` has the pieces of the bodies, those at rest first, where they are
+        packed already; of bodies with rough versions or parts it is of no use.
 
         Raises:
             ValueError: If bodies, pairs and tree do not fit together.
@@ -59,16 +65,29 @@ class Question:
         plan = planned_parts(tree, bodies, pairs)
         rough = with_rough(plan.bodies, plan.pairs)
         number, every = plan.number[rough.original], rough.bodies
-        pieces = pack_pieces([body.pieces for body in every])
+        if packed is None or len(every) > len(bodies):
+            packed = pack_pieces([body.pieces for body in every])
         count = 1 if columns is None else int(columns.max(initial=0)) + 1
         columns = None if columns is None else columns[number]
-        extent, rules = _extent(tree, pieces), Budget().rules(0.0)
-        task = pack_task(tree, every, rough.pairs, rules, None, columns, pieces)
-        box = errors or ErrorBox(*np.zeros((3, len(tree.joints))))
-        if box.surfaces is not None:
-            surfaces = np.asarray(box.surfaces, dtype=np.float64)[number]
-            box = ErrorBox(box.joints, box.shifts, box.tilts, surfaces)
-        return cls(tree, plan, pairs.size, task, box, count, extent)
+        extent, rules = _extent(tree, packed), Budget().rules(0.0)
+        task = pack_task(tree, every, rough.pairs, rules, None, columns, packed)
+        none = ErrorBox(*np.zeros((3, len(tree.joints))))
+        asked = cls(tree, plan, pairs.size, task, number, none, count, extent)
+        return asked if errors is None else asked.under(errors)
+
+    def under(self, errors: ErrorBox) -> "Question":
+        """The same under other errors, of surfaces of bodies as they were given."""
+        if errors.surfaces is not None:
+            surfaces = np.asarray(errors.surfaces, dtype=np.float64)[self.number]
+            errors = replace(errors, surfaces=surfaces)
+        return replace(self, errors=errors)
+
+    @property
+    def places(self) -> list[int]:
+        """Where each body as it was given stands among the packed ones."""
+        n_bodies = int(self.number.max(initial=-1)) + 1
+        order = np.argsort(self.number[:n_bodies], kind="stable")
+        return [int(k) for k in order]
 
     def about(self, path: Path, budget: Budget | None = None) -> Proving:
         """The question about a motion, nothing judged.

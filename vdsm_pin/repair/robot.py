@@ -6,10 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
-from vdsm_pin.proof.bodies import Pair
 from vdsm_pin.repair.rounds import APART, Origins, Places, Repaired, repaired
 from vdsm_pin.repair.smooth import bulged, on_curve, sampled
 from vdsm_pin.robots.cell import Cell
@@ -64,11 +63,10 @@ class _Motion:
         if rows.rates is not None:
             origins, rows = on_curve(self.given, at, origins, rows)
         others = self._others(rows.times, len(rows.q))
-        pairs = [self.cell.pairs[k] for k in margins]
-        more = np.array([*margins.values()])
-        slopes = _Slopes(self.cell, pairs, more)
-        names = [self.cell.names(pair) for pair in pairs]
-        required = np.array([pair.required for pair in pairs])
+        asked, more = self.cell.asked, np.array([*margins.values()])
+        slopes = _Slopes(self.cell, np.array([*margins]), more)
+        names = [str(asked.pair(k)) for k in margins]
+        required = asked.table.required[[*margins]]
         bad = origins.too_near(slopes.gaps(rows.q, others), more, required, names)
         if rows.times is not None and rows.rates is not None:
             rows, bad = bulged(
@@ -134,9 +132,9 @@ def repair_robot(
 class _Slopes:
     """How much room pairs have beyond what is asked, and where it grows."""
 
-    def __init__(self, cell: Cell, pairs: Sequence[Pair], margins: FloatArray) -> None:
-        self._cell, self._pairs = cell, pairs
-        self._target = np.array([pair.required for pair in pairs]) + margins
+    def __init__(self, cell: Cell, pairs: IntArray, margins: FloatArray) -> None:
+        self._cell, self._table = cell, cell.asked.among(pairs).table
+        self._target = self._table.required + margins
         joints = cell.robot.joints
         self._limits = [j.lower for j in joints], [j.upper for j in joints]
 
@@ -147,7 +145,7 @@ class _Slopes:
             q: Columns of the robot, shape (n_rows, n_columns); [rad], [m].
             others: Of what moves beside, shape (n_rows, n_more).
         """
-        columns = [self._of(k, q, others) for k in range(len(self._pairs))]
+        columns = [self._of(k, q, others) for k in range(self._table.size)]
         return np.stack(columns, axis=1)
 
     def up(self, q: FloatArray, others: FloatArray) -> FloatArray:
@@ -173,8 +171,8 @@ class _Slopes:
     def _of(self, k: int, q: FloatArray, others: FloatArray) -> FloatArray:
         """Room of one pair at rows of q, shape (n_rows,); [m]."""
         others = np.broadcast_to(others, (len(q), others.shape[1]))
-        poses = self._cell.poses(np.hstack([q, others]))
-        one, other = self._pairs[k].one, self._pairs[k].other
+        poses = self._cell.asked.poses(np.hstack([q, others]))
+        one, other = self._table.one[k], self._table.other[k]
         both = np.full(len(q), one), np.full(len(q), other)
         found = self._cell.distances(*both, poses)
         return np.asarray(found - self._target[k])

@@ -7,10 +7,10 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_centres, link_angles, tip_jacobian
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.proof.paths import Path
 from vdsm_pin.verification.pair_slopes import pair_slopes
-from vdsm_pin.verification.task import all_pairs, make_task
+from vdsm_pin.verification.task import arm_assembly
 
 PUSHES: Final = 40
 """Most steps of one row up the slopes."""
@@ -43,8 +43,10 @@ class Slopes:
 
     def __init__(self, problem: PlanningProblem) -> None:
         self.problem, self._arm = problem, problem.manipulator
-        self.names = [str(pair) for pair in all_pairs(problem)]
-        self._task = make_task(problem, ErrorBox())
+        asked = arm_assembly(problem)
+        self.names = [str(pair) for pair in asked.pairs]
+        still = Path(np.zeros((1, asked.tree.n_columns)))
+        self._task = asked.question.about(still).task
         self._required = self._task.pairs.required
         self._scale = joint_scale(self._arm)
         self._goal = TIP * problem.tip_tolerance

@@ -1,7 +1,7 @@
 """A robot among its obstacles: from files named one by one, or from a problem file."""
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Final
 
@@ -12,11 +12,9 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.packed_tree import TreePoses
+from vdsm_pin.proof.bodies import Pair, PairTable
 from vdsm_pin.proof.question import Question
-from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.errors import check_errors, proof_box
+from vdsm_pin.robots.errors import check_errors, joint_errors
 from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.other_robots import read_other
@@ -24,11 +22,9 @@ from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import in_mm
+from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.coal_bodies import coal_obstacle
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
-from vdsm_pin.verification.contacts import Placed
-from vdsm_pin.verification.moving import joined_tree, obstacle_frames
-from vdsm_pin.verification.records import Pair as NamedPair
 
 ROOT_FRAME: Final = 1
 """The frame that obstacles stand in: of the root link, where it does not move."""
@@ -74,64 +70,35 @@ class Cell(AnyProblem):
         check_errors(self.robot, self.scene, errors)
 
     @cached_property
-    def tree(self) -> Tree:
-        """The robot's joints first, then those that carry obstacles."""
-        return joined_tree(self.robot.tree, self.scene)
-
-    @cached_property
-    def poses(self) -> TreePoses:
-        """T_world_frame of its frames, a function of rows of q."""
-        return TreePoses(self.tree)
-
-    @cached_property
-    def bodies(self) -> list[Body]:
-        """Links first, then obstacles."""
-        frames = obstacle_frames(self.robot.tree, self.scene)
-        both = zip(frames, self.scene.obstacles, strict=True)
-        obstacles = (Body(frame, one.pieces, one.name) for frame, one in both)
-        return [*self.robot.bodies, *obstacles]
-
-    @cached_property
-    def pairs(self) -> list[Pair]:
-        """All that are held apart; the obstacle first, which may have many pieces."""
-        n = len(self.robot.bodies)
-        outer = range(n, len(self.bodies))
+    def asked(self) -> Assembly:
+        """What of it is held apart."""
+        bodies, n = self.robot.bodies, len(self.robot.bodies)
+        outer = range(n, n + len(self.scene.obstacles))
         required = self.required_clearance
         pairs = [Pair(k, b, required) for k in outer for b in range(n)]
         own = self.required_self_clearance
-        return pairs + [Pair(i, k, own) for i, k in self.robot.held]
-
-    @cached_property
-    def pair_table(self) -> PairTable:
-        """The same as columns."""
-        return PairTable.of(self.pairs)
-
-    @cached_property
-    def named_pairs(self) -> tuple[NamedPair, ...]:
-        """The pairs by the names of their bodies, a link first."""
-        n, found = len(self.robot.bodies), []
-        for pair in self.pairs:
-            one, other = self.bodies[pair.one].name, self.bodies[pair.other].name
-            if pair.one >= n:
-                named = NamedPair(link=pair.other + 1, obstacle=one, body=other)
-            else:
-                both = {"body": one, "other_body": other}
-                named = NamedPair(pair.one + 1, other_link=pair.other + 1, **both)
-            found.append(named)
-        return tuple(found)
+        pairs += [Pair(i, k, own) for i, k in self.robot.held]
+        return Assembly(
+            own_tree=self.robot.tree,
+            own=bodies,
+            links=range(1, n + 1),
+            names=[body.name for body in bodies],
+            balls=[0.0] * n,
+            scene=self.scene,
+            table=PairTable.of(pairs),
+            column_errors=partial(joint_errors, self.robot.joints),
+        )
 
     @cached_property
     def question(self) -> Question:
         """All pairs under the errors, packed for any motion."""
-        columns = np.arange(len(self.bodies))
-        box = proof_box(self.robot, self.scene, self.errors)
-        return Question.of(self.tree, self.bodies, self.pair_table, box, columns)
+        return self.asked.question.under(self.asked.box(self.errors))
 
     @cached_property
     def coal(self) -> CoalShapes:
         """The bodies as Coal has them."""
         things = map(coal_obstacle, self.scene.obstacles)
-        frames = [body.frame for body in self.bodies]
+        frames = [body.frame for body in self.asked.bodies]
         return CoalShapes(frames, [*link_shapes(self.robot), *things])
 
     def distances(
@@ -150,14 +117,6 @@ class Cell(AnyProblem):
         placed = Sides(np.arange(len(poses)), *sides)
         return self.coal.distances(poses[:, :, :3], placed).distance
 
-    def placed(self, pair: Pair, poses: FloatArray) -> tuple[Placed, Placed]:
-        """Both bodies at poses of all frames, shape (n_frames, 4, 4); [m]."""
-        one, other = self.bodies[pair.one], self.bodies[pair.other]
-        return (
-            Placed(one.pieces, poses[one.frame]),
-            Placed(other.pieces, poses[other.frame]),
-        )
-
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Robot, scene and what is required."""
         joints = ", ".join(joint.name for joint in self.robot.joints[:8])
@@ -169,12 +128,6 @@ class Cell(AnyProblem):
             ("required clearance", in_mm(self.required_clearance)),
             ("file", str(self.source.path) if self.source else "changed in Python"),
         )
-
-    def names(self, pair: Pair) -> str:
-        """Both bodies of a pair in words, a link first."""
-        both = (pair.one, pair.other)
-        one, other = both[::-1] if pair.one >= len(self.robot.bodies) else both
-        return f"{self.bodies[one].name} and {self.bodies[other].name}"
 
 
 def cell_of(

@@ -12,13 +12,8 @@ from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.proof.error_box import ErrorBox as ProofBox
 from vdsm_pin.robots.model import Robot, RobotJoint
-from vdsm_pin.verification.moving import joined_tree
-from vdsm_pin.verification.task import obstacle_growth
-
-BASE = 0
-"""Number of the joint between world and root link."""
+from vdsm_pin.verification.assembly import obstacle_growth
 
 
 def check_errors(robot: Robot, scene: Scene, errors: ErrorBox) -> None:
@@ -55,22 +50,3 @@ def joint_errors(joints: Sequence[RobotJoint], errors: ErrorBox) -> FloatArray:
     for one in errors.named:  # of one that turns the shift is 0, and the reverse
         largest[one.name] = max(largest[one.name], one.turn, one.shift)
     return np.array([*largest.values()])
-
-
-def proof_box(robot: Robot, scene: Scene, errors: ErrorBox) -> ProofBox | None:
-    """The same for the proof; None for no errors.
-
-    A joint that mimics another one errs by as much as its ratio makes of it.
-    """
-    if errors == ErrorBox():
-        return None
-    of_columns = joint_errors(robot.joints, errors)
-    n_joints = len(joined_tree(robot.tree, scene).joints)
-    joints, shifts, tilts = np.zeros((3, n_joints))
-    for k, joint in enumerate(robot.tree.joints):
-        if joint.column is not None:
-            joints[k] = abs(joint.ratio) * of_columns[joint.column]
-    shifts[BASE], tilts[BASE] = errors.base, errors.base_turn
-    of_links = [0.0] * len(robot.bodies)
-    surfaces = np.array([*of_links, *obstacle_growth(scene.obstacles, errors)])
-    return ProofBox(joints, shifts, tilts, surfaces)

@@ -1,23 +1,21 @@
 """When a robot is first and last too close to something, and in which intervals."""
 
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray
-from vdsm_pin.proof.bodies import Pair as BodyPair
-from vdsm_pin.proof.bodies import PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import start_proof, summed
+from vdsm_pin.proof.prover import summed
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.clearances import least_clearances
 from vdsm_pin.time_limit import Deadline
+from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.brackets import LeastClearances
+from vdsm_pin.verification.clearances import least_clearances, with_depths
 from vdsm_pin.verification.contacts import MEETING
 from vdsm_pin.verification.first_contact import (
     FirstContact,
@@ -26,7 +24,6 @@ from vdsm_pin.verification.first_contact import (
     first_contacts,
 )
 from vdsm_pin.verification.moving import in_short_parts, joined_path
-from vdsm_pin.verification.records import Pair
 
 ENOUGH: Final = 1e-6
 """How deep a ball in both bodies need lie to tell that they meet; [m]."""
@@ -41,9 +38,7 @@ MOST_MEETINGS: Final = 32
 def robot_contacts(
     cell: Cell,
     path: Path,
-    pairs: tuple[Pair, ...],
     least: LeastClearances,
-    box: ErrorBox | None,
     deadline: Deadline,
 ) -> tuple[FirstContact, ...]:
     """Where the clearance is first lost, from obstacles and between links.
@@ -51,9 +46,7 @@ def robot_contacts(
     Args:
         cell: The robot and its scene.
         path: The robot's motion.
-        pairs: As the cell's, by their names.
-        least: Their least clearances over the whole motion.
-        box: The errors of the proof.
+        least: Least clearances of its pairs over the whole motion.
         deadline: When to give up.
 
     Raises:
@@ -63,26 +56,23 @@ def robot_contacts(
         return ()
     # What is proved of the whole motion holds for its stretches.
     left = np.flatnonzero(least.verdict != CERTIFIED)
-    judge = _Judge(cell, path, [cell.pairs[k] for k in left], box, deadline)
-    named, noted = [pairs[k] for k in left], judge.noted()
-    return first_contacts(cell, named, least.of(left), path, judge, noted, SHALLOW)
+    asked = cell.asked.among(left)
+    judge = _Judge(asked, path, asked.box(cell.errors), deadline)
+    about = cell, asked.pairs, least.of(left), path, judge
+    return first_contacts(*about, judge.noted(), SHALLOW)
 
 
 class _Judge:
     """Proves stretches of a motion between moments in waypoints, of some pairs."""
 
     def __init__(
-        self,
-        cell: Cell,
-        path: Path,
-        pairs: Sequence[BodyPair],
-        box: ErrorBox | None,
-        deadline: Deadline,
+        self, asked: Assembly, path: Path, box: ErrorBox, deadline: Deadline
     ) -> None:
-        self._cell, self._pairs, self._deadline = cell, pairs, deadline
-        self._path, self._knots = in_short_parts(*joined_path(path, cell.scene))
-        asked = self._path, PairTable.of(pairs), box, Budget(until=deadline.end)
-        proving, self._plan = start_proof(cell.tree, cell.bodies, *asked)
+        self._asked, self._deadline = asked, deadline
+        self._path, self._knots = in_short_parts(*joined_path(path, asked.scene))
+        question = asked.question.under(box)
+        self._plan = question.plan
+        proving = question.about(self._path, Budget(until=deadline.end))
         self._stretches = Stretches(proving, np.arange(proving.n_pairs))
 
     def __call__(self, low: float, high: float) -> Judged:
@@ -90,10 +80,9 @@ class _Judge:
         self._deadline.check()
         span = self._knots.inner(np.array([low, high]))
         results, in_time = self._stretches.over(*span.tolist())
-        proof = summed(results, self._plan, len(self._pairs), in_time)
-        return least_clearances(
-            self._cell, self._pairs, self._path, proof, ENOUGH, span
-        )
+        proof = summed(results, self._plan, self._asked.table.size, in_time)
+        least = least_clearances(self._asked, proof)
+        return with_depths(self._asked, self._path, least, ENOUGH, span)
 
     def noted(self) -> Noted | None:
         """The intervals in which some pair is too close; None where too many."""
@@ -109,8 +98,7 @@ class _Judge:
             return None
         for k in meeting.tolist():
             refuted[k] |= self(k, k + 1).verdict == REFUTED
-        n = len(self._cell.robot.bodies)
-        outer = np.array([pair.one >= n for pair in self._pairs], bool)
+        outer = self._asked.outer
         of_kind = (
             np.asarray(refuted[:, outer == k].any(axis=1)) for k in (False, True)
         )
@@ -118,5 +106,5 @@ class _Judge:
 
     def _by_pair(self, parts: BoolArray) -> BoolArray:
         """Whether it is so of any part of each pair, of each interval."""
-        first = np.searchsorted(self._plan.owner, np.arange(len(self._pairs)))
+        first = np.searchsorted(self._plan.owner, np.arange(self._asked.table.size))
         return np.asarray(np.logical_or.reduceat(parts, first, axis=1))

@@ -16,10 +16,10 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import answer
 from vdsm_pin.proof.question import Question
@@ -45,14 +45,14 @@ class Place(NamedTuple):
 
 
 def locate_links(
-    cell: Cell, path: Path, box: ErrorBox | None, budget: Budget
+    cell: Cell, path: Path, errors: ErrorBox, budget: Budget
 ) -> dict[int, Place]:
     """Where each link begins as seen from each mesh that may have an inside.
 
     Args:
         cell: Robot and scene.
         path: Of all that moves.
-        box: The errors of the proof.
+        errors: Those of the proof.
         budget: Of the proof off hulls.
 
     Returns:
@@ -62,7 +62,7 @@ def locate_links(
     unknown = unlocated_pairs(found)
     if not unknown:
         return found
-    asked = question_of_hulls(cell, unknown, box, unknown)
+    asked = question_of_hulls(cell, unknown, errors, unknown)
     proof = answer(asked, path, budget)
     clear = [unknown[k] for k in np.flatnonzero(proof.verdict == CERTIFIED)]
     outside = Location(Side.OUTSIDE)
@@ -77,7 +77,7 @@ def unlocated_pairs(located: Mapping[int, Place]) -> list[int]:
 def question_of_hulls(
     cell: Cell,
     hulled: Sequence[int],
-    box: ErrorBox | None,
+    errors: ErrorBox,
     asked: Sequence[int] | None = None,
 ) -> Question:
     """Pairs of a cell, with the hulls of meshes in place of the meshes in some of them.
@@ -87,21 +87,21 @@ def question_of_hulls(
     Args:
         cell: Robot and scene.
         hulled: Numbers of the pairs that are asked of the hull of their mesh.
-        box: The errors of the proof.
+        errors: Those of the proof.
         asked: Numbers of the pairs that are asked; None for all.
     """
-    bodies, pairs, n = [*cell.bodies], [*cell.pairs], len(cell.robot.bodies)
-    meshes = list(dict.fromkeys(pairs[k].one for k in hulled))
-    for one in meshes:
-        mesh = cast("Mesh", solid_of(cell.scene.obstacles[one - n]))
-        bodies.append(replace(bodies[one], pieces=mesh.hull.pieces))
-    for k in hulled:
-        number = len(cell.bodies) + meshes.index(pairs[k].one)
-        pairs[k] = replace(pairs[k], one=number)
-    if box is not None and box.surfaces is not None:
-        box = replace(box, surfaces=np.append(box.surfaces, box.surfaces[meshes]))
-    table = PairTable.of(pairs if asked is None else [pairs[k] for k in asked])
-    return Question.of(cell.tree, bodies, table, box)
+    held, table = cell.asked, cell.asked.table
+    one, n, box = table.one.copy(), len(held.bodies), held.box(errors)
+    meshes = list(dict.fromkeys(one[hulled].tolist()))
+    bodies, surfaces = [*held.bodies], np.asarray(box.surfaces)
+    for number in meshes:
+        mesh = cast("Mesh", solid_of(cell.scene.obstacles[number - len(held.own)]))
+        bodies.append(replace(bodies[number], pieces=mesh.hull.pieces))
+    one[hulled] = [n + meshes.index(number) for number in one[hulled].tolist()]
+    which = np.arange(table.size) if asked is None else np.array(asked)
+    pairs = PairTable(one[which], table.other[which], table.required[which])
+    box = replace(box, surfaces=np.append(surfaces, surfaces[meshes]))
+    return Question.of(held.tree, bodies, pairs, box)
 
 
 def at_start(cell: Cell, path: Path) -> dict[int, Place]:
@@ -110,12 +110,15 @@ def at_start(cell: Cell, path: Path) -> dict[int, Place]:
     found = dict[int, Place]()
     if not any(isinstance(one, Mesh) for one in solids):
         return found
-    n, poses = len(cell.robot.bodies), cell.poses(path.knots[:1])[0]
-    for k, pair in enumerate(cell.pairs):
-        mesh = solids[pair.one - n] if pair.one >= n else None
+    asked = cell.asked
+    bodies, poses = asked.bodies, asked.poses(path.knots[:1])[0]
+    for k in np.flatnonzero(asked.outer).tolist():
+        own, partner = asked.sides(k)
+        mesh = solids[partner - len(asked.own)]
         if isinstance(mesh, Mesh) and not mesh.is_surface:
-            link, rest = cell.bodies[pair.other], poses[cell.bodies[pair.one].frame]
-            found[k] = _place(mesh, link, poses[link.frame], rest, pair.required)
+            link, rest = bodies[own], poses[bodies[partner].frame]
+            needed = float(asked.table.required[k])
+            found[k] = _place(mesh, link, poses[link.frame], rest, needed)
     return found
 
 
@@ -154,7 +157,7 @@ def by_mesh(cell: Cell, located: Mapping[int, Place]) -> dict[str, Location]:
     """What of each mesh says the most against the motion."""
     found = dict[str, list[Location]]()
     for k, one in located.items():
-        found.setdefault(cell.bodies[cell.pairs[k].one].name, []).append(one.where)
+        found.setdefault(cell.asked.pair(k).obstacle, []).append(one.where)
     return {name: worst_location(each) for name, each in found.items()}
 
 
@@ -185,10 +188,11 @@ def enclosed_profile(
     """The profile with meshes as solids, until links that begin inside may come out."""
     changed = {one.name: getattr(profile, one.name).copy() for one in fields(profile)}
     for k in pairs_inside(located):
-        pair, n = cell.pairs[k], len(cell.robot.bodies)
-        met = changed["obstacle_lower"][:, pair.one - n] <= 0.0
+        own, partner = cell.asked.sides(k)
+        obstacle = partner - len(cell.asked.own)
+        met = changed["obstacle_lower"][:, obstacle] <= 0.0
         inside = ~np.logical_or.accumulate(met)
-        for name, column in (("link", pair.other), ("obstacle", pair.one - n)):
+        for name, column in (("link", own), ("obstacle", obstacle)):
             for side in ("lower", "upper"):
                 values = changed[f"{name}_{side}"]
                 values[inside, column] = np.minimum(values[inside, column], 0.0)

@@ -8,19 +8,14 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Side
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import Proof, answer, prove
+from vdsm_pin.proof.prover import Proof, answer
 from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.clearances import (
-    least_clearances,
-    least_in_rows,
-)
-from vdsm_pin.robots.counterexamples import in_rows, robot_counterexamples
-from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.first_contact import robot_contacts
 from vdsm_pin.robots.inside import (
     by_mesh,
@@ -32,11 +27,13 @@ from vdsm_pin.robots.inside import (
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.best_effort import BestEffort
-from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
+from vdsm_pin.verification.clearances import in_rows as least_in_rows
+from vdsm_pin.verification.clearances import least_clearances, profile_of, with_depths
 from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_shapes import disagreement
 from vdsm_pin.verification.contacts import MEETING
+from vdsm_pin.verification.counterexamples import find_counterexamples, in_rows
 from vdsm_pin.verification.enclosed import enclosed_least
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS_OUTSIDE, check_inside
@@ -77,20 +74,20 @@ def verify_robot(
     """
     robot = cell.robot
     budget = Budget(until=deadline.end, slack=WIDTH)
-    box = proof_box(robot, cell.scene, cell.errors)
+    asked = cell.asked
     whole, knots = in_short_parts(*joined_path(path, cell.scene))
     proof = answer(cell.question, whole, budget)
-    located = locate_links(cell, whole, box, budget)
-    named = cell.named_pairs
-    proved = least_clearances(cell, cell.pairs, whole, proof)
+    located = locate_links(cell, whole, cell.errors, budget)
+    named = asked.pairs
+    proved = with_depths(asked, whole, least_clearances(asked, proof))
     coal, measured = _coal(cell, whole, proof, knots)
     least, extras = enclosed_least(proved, pairs_inside(located)), BestEffort()
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
-    asked = cell, whole, named, least, proof.lower_interval, deadline
-    lost = extras.take("search for counterexamples", (), robot_counterexamples, *asked)
+    sought = asked, whole.at_moments, least, proof.lower_interval, cell.errors, deadline
+    lost = extras.take("search for counterexamples", (), find_counterexamples, *sought)
     met: tuple[FirstContact, ...] = ()
     if contacts:
-        of_all = cell, path, named, proved, box, deadline
+        of_all = cell, path, proved, deadline
         met = extras.take("first contact", (), robot_contacts, *of_all)
     lost, least = in_rows(lost, knots), least_in_rows(least, knots)
     name = "proof of the motion without errors"
@@ -111,7 +108,7 @@ def verify_robot(
         *checks_of_others(cell.scene),
         *check_inside(by_mesh(cell, located), LINKS_OUTSIDE),
         *clearance_checks(cell, evidence, None if proof.in_time else deadline),
-        *([coal] if cell.pairs else [_no_pair(cell)]),
+        *([coal] if named else [_no_pair(cell)]),
     ]
     nearest = nearest_pairs(named, least).items()
     approaches = tuple(
@@ -142,10 +139,10 @@ def _no_pair(cell: Cell) -> Check:
 def _is_clear(cell: Cell, path: Path, deadline: Deadline) -> bool:
     """Whether the motion is proved clear of everything, without errors."""
     budget = Budget(until=deadline.end, slack=WIDTH)
-    located = locate_links(cell, path, None, budget).values()
+    located = locate_links(cell, path, ErrorBox(), budget).values()
     if any(one.where.side is not Side.OUTSIDE for one in located):
         return False
-    return prove(cell.tree, cell.bodies, path, cell.pairs, budget=budget).is_certified
+    return answer(cell.asked.question, path, budget).is_certified
 
 
 def _coal(
@@ -162,9 +159,10 @@ def _coal(
     Returns:
         The check, and the distances, NaN where there is none, shape (n_pairs,); [m].
     """
-    table, found = cell.pair_table, np.full(len(cell.pairs), nan)
+    asked = cell.asked
+    table, found = asked.table, np.full(asked.table.size, nan)
     seen = np.flatnonzero(np.isfinite(proof.upper))
-    poses = cell.poses(path.within(proof.interval[seen], proof.share[seen]))
+    poses = asked.poses(path.within(proof.interval[seen], proof.share[seen]))
     found[seen] = cell.distances(table.one[seen], table.other[seen], poses)
     off = disagreement(found, proof.lower, proof.upper)
     moments = knots.moments(proof.interval, proof.share)
@@ -173,7 +171,7 @@ def _coal(
     if measured.size:
         worst = measured[np.argmax(off[measured])]
         evidence.add(float(off[worst]), "", float(moments[worst]))
-    where = f"{evidence.count} of {len(cell.pairs)} pairs measured"
-    untold = cell.coal.untold([body.name for body in cell.bodies])
+    where = f"{evidence.count} of {table.size} pairs measured"
+    untold = cell.coal.untold([body.name for body in asked.bodies])
     note = f"{where}, each where it was found nearest{untold}"
     return evidence.check(note), found

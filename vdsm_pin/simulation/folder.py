@@ -13,7 +13,6 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.rows import FileModel, VerdictWord
 from vdsm_pin.report.run_record import versions
@@ -196,8 +195,8 @@ def cleared(
     rows = [*check_clearance(problem, proof, ()), *check_inside(located)]
     verdict = combine(tuple(row.verdict for row in rows))
     near = [
-        float(row[LOW])
-        for pair, row in zip(proof.pairs, proof.best, strict=True)
+        lower
+        for pair, lower in zip(proof.pairs, proof.least.lower.tolist(), strict=True)
         if pair.obstacle
     ]
     if arm_inside(located):

@@ -12,9 +12,9 @@ from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.records import ClosestApproach, Pair, is_deepest
-from vdsm_pin.verification.task import ball_of
 
 CLOSEST: Final = 10
 """Most pairs that are listed."""
@@ -23,7 +23,7 @@ CLOSEST: Final = 10
 def closest_approaches(
     problem: PlanningProblem,
     trajectory: Trajectory,
-    pairs: Sequence[Pair],
+    asked: Assembly,
     least: LeastClearances,
 ) -> tuple[ClosestApproach, ...]:
     """The pairs that come nearest, by their upper bounds; obstacles first.
@@ -34,16 +34,16 @@ def closest_approaches(
     Args:
         problem: Arm and scene.
         trajectory: The motion.
-        pairs: Every pair.
-        least: What is proved of them, meshes as solids.
+        asked: What is held apart.
+        least: What is proved of every pair, meshes as solids.
     """
     return tuple(
         replace(
             near,
             station=_station(problem, trajectory, near),
-            deeper=is_deepest(near.upper, ball_of(problem, near.pair)),
+            deeper=is_deepest(near.upper, asked.ball(k)),
         )
-        for near in nearest_pairs(pairs, least).values()
+        for k, near in nearest_pairs(asked.pairs, least).items()
     )
 
 

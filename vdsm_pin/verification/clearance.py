@@ -20,33 +20,34 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import (
-    AT_UPPER,
     LOW,
-    OTHER,
-    OWN,
     SLICES,
     TALLY,
-    TIME,
-    UP,
 )
-from vdsm_pin.proof.prover import RANK, verdicts_of
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import RANK
 from vdsm_pin.proof.proving import dense_rows, room_for
 from vdsm_pin.proof.rows import BLOCK
-from vdsm_pin.proof.terms import (
-    ACROSS,
-    WITHIN,
-)
+from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.brackets import (
     ClearanceChunk,
     ClearanceProfile,
     ClearanceSink,
     LeastClearances,
 )
+from vdsm_pin.verification.clearances import (
+    in_rows,
+    least_clearances,
+    profile_of,
+    with_balls,
+)
+from vdsm_pin.verification.contacts import MEETING
+from vdsm_pin.verification.counterexamples import find_counterexamples
 from vdsm_pin.verification.moving import Knots
 from vdsm_pin.verification.proving import ProblemProof, prove_problem
-from vdsm_pin.verification.records import Pair
-from vdsm_pin.verification.task import all_pairs
+from vdsm_pin.verification.records import Counterexample, Pair
 
 CHUNK_VALUES: Final = 1_000_000
 """Most (interval, pair) values held at once for the sinks."""
@@ -54,49 +55,86 @@ CHUNK_VALUES: Final = 1_000_000
 CHUNK: Final = 4096
 """Most intervals between two chunks."""
 
+MOST_MEETINGS: Final = 32
+"""Pairs in which a ball in both is looked for."""
+
 
 @dataclass(frozen=True)
 class ClearanceProof:
     """What the sweep proved.
 
     Args:
-        pairs: Every pair.
+        asked: What is held apart.
+        path: The motion of all that moves.
+        knots: Where its intervals lie in the trajectory.
         counts: Intervals certified, refuted and undecided, shape (n_pairs, 3); knots of
             what carries obstacles end intervals too.
-        best: Least bounds of each pair, as `proof.layouts` lays them out,
-            shape (n_pairs, BEST); [m].
+        inner: The least clearances, in intervals of the path.
+        weakest: Of each pair the interval of the trajectory with its least lower bound,
+            shape (n_pairs,).
         profile: Brackets along the motion.
         slices: Slices tried beyond one per interval and pair.
-        n_intervals: Of the motion.
         late: Whether the time was over before all was judged.
         sent: Intervals whose brackets the sinks received: all, if there was time.
     """
 
-    pairs: tuple[Pair, ...]
+    asked: Assembly
+    path: Path
+    knots: Knots
     counts: IntArray
-    best: FloatArray
+    inner: LeastClearances
+    weakest: IntArray
     profile: ClearanceProfile
     slices: int
-    n_intervals: int
     late: bool
     sent: int
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """Every pair."""
+        return self.asked.pairs
+
+    @property
+    def n_intervals(self) -> int:
+        """Intervals of the trajectory."""
+        return len(self.knots.first) - 1
+
+    def rows(self, moments: FloatArray) -> FloatArray:
+        """Rows of all columns at moments in waypoints, (m,) to (m, n_columns)."""
+        return self.path.at_moments(self.knots.inner(moments))
 
     @cached_property
     def least(self) -> LeastClearances:
         """The least bounds of every pair, with their witnesses."""
-        best = self.best
-        own, other = best[:, OWN:OTHER], best[:, OTHER : OTHER + 3]
-        # In a pair of links the sweep moves the second one against the first.
-        swapped = np.array([not pair.obstacle for pair in self.pairs], bool)[:, None]
-        return LeastClearances(
-            interval=frozen(best[:, AT_UPPER], np.int64),
-            share=frozen(best[:, TIME]),
-            lower=frozen(best[:, LOW]),
-            upper=frozen(best[:, UP]),
-            verdict=verdicts_of(self.counts),
-            link_point=frozen(np.where(swapped, other, own)),
-            other_point=frozen(np.where(swapped, own, other)),
-        )
+        return in_rows(self.inner, self.knots)
+
+    def counterexamples(
+        self, errors: ErrorBox, deadline: Deadline = NO_LIMIT
+    ) -> tuple[Counterexample, ...]:
+        """Motions within the errors of the proof that miss what it left undecided.
+
+        Raises:
+            OutOfTime: If the time is over.
+        """
+        known = self.asked, self.rows, self.least, self.weakest
+        return find_counterexamples(*known, errors, deadline)
+
+    def with_meetings(self, deadline: Deadline = NO_LIMIT) -> "ClearanceProof":
+        """The same with pairs refuted of which a ball is proved to lie in both bodies.
+
+        No depth is measured of bodies that nothing grows: where they meet their
+        clearance is 0 at most, which refutes no required clearance of 0.
+        """
+        inner, counts = self.inner, self.counts.copy()
+        near = (inner.verdict == UNDECIDED) & (inner.upper <= MEETING)
+        pairs = np.flatnonzero(near)[:MOST_MEETINGS]
+        span = np.array([0.0, self.path.n_intervals])
+        how = np.inf, span, deadline
+        found = with_balls(self.asked, self.path, inner, pairs, *how)
+        lost = pairs[found.verdict[pairs] == REFUTED]
+        counts[lost, REFUTED] += 1
+        counts[lost, UNDECIDED] -= 1
+        return replace(self, inner=found, counts=frozen(counts, np.int64))
 
 
 def _chunk(
@@ -107,7 +145,7 @@ def _chunk(
     dense, count = proving.results.dense, int(knots.first[last] - knots.first[first])
     own, other = dense.own[:count], dense.other[:count]
     # In a pair of links the sweep moves the second one against the first.
-    swapped = (proving.task.pairs.group == WITHIN)[None, :, None]
+    swapped = ~proof.asked.outer[None, :, None]
     chunk = ClearanceChunk(
         first_interval=first,
         # No interval is worse than what narrowing proved of all of them.
@@ -145,32 +183,6 @@ def _merged(chunk: ClearanceChunk, knots: Knots, last: int) -> ClearanceChunk:
     )
 
 
-def profile_of(
-    profile: FloatArray, stride: int, knots: Knots, n_links: int
-) -> ClearanceProfile:
-    """Brackets along a motion, by intervals of its trajectory.
-
-    Args:
-        profile: By column in bins of intervals of the joint path, those of links first,
-            shape (2, n_columns, n_bins); [m].
-        stride: Intervals of a bin.
-        knots: Of the trajectory.
-        n_links: Columns of links.
-    """
-    first = np.arange(profile.shape[2]) * stride
-    if not knots.are_rows:
-        first, begins = np.unique(knots.interval(first), return_index=True)
-        profile = np.minimum.reduceat(profile, begins, axis=2)
-    profile.setflags(write=False)
-    return ClearanceProfile(
-        link_lower=profile[0, :n_links].T,
-        link_upper=profile[1, :n_links].T,
-        obstacle_lower=profile[0, n_links:].T,
-        obstacle_upper=profile[1, n_links:].T,
-        first_interval=frozen(first, np.int64),
-    )
-
-
 def prove_clearance(
     problem: PlanningProblem,
     trajectory: Trajectory,
@@ -195,20 +207,22 @@ def prove_clearance(
     """
     budget = Budget(until=deadline.end)
     proof = prove_problem(problem, trajectory, errors, budget)
-    step("proving the clearance of %d pairs", len(proof.best))
+    step("proving the clearance of %d pairs", proof.question.n_pairs)
     with watched(lambda: proof.proving.share):
         late = not proof.proving.run()
-    results, sent = proof.proving.results, 0
+    results, told, sent = proof.proving.results, proof.told(), 0
     n_links = problem.manipulator.n_links
     if sinks:
         sent = _send(problem, trajectory, errors, proof, sinks, reach)
     return ClearanceProof(
-        pairs=all_pairs(problem),
+        asked=proof.asked,
+        path=proof.path,
+        knots=proof.knots,
         counts=frozen(results.counts, np.int64),
-        best=frozen(proof.best),
+        inner=least_clearances(proof.asked, told),
+        weakest=proof.knots.interval(told.lower_interval),
         profile=profile_of(results.profile, results.stride, proof.knots, n_links),
         slices=int(results.tally[SLICES]),
-        n_intervals=len(proof.knots.first) - 1,
         late=late,
         sent=sent,
     )
@@ -229,7 +243,7 @@ def _send(
     """
     proving = proof.proving
     known, obstacles = proving.results, problem.scene.obstacles
-    outer, obstacle = proving.task.pairs.group == ACROSS, proving.task.pairs.obstacle
+    outer, obstacle = proof.asked.outer, proof.asked.table.one - len(proof.asked.own)
     # numpy.unique imports numpy.ma, for which every process would wait.
     near = np.flatnonzero(np.bincount(obstacle[outer & (known.best[:, LOW] <= reach)]))
     pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)

@@ -24,7 +24,6 @@ from vdsm_pin.verification.records import (
     Verdict,
     is_deepest,
 )
-from vdsm_pin.verification.task import ball_of
 
 OBSTACLES: Final = "clearance from obstacles"
 LINKS: Final = "clearance between links"
@@ -76,7 +75,7 @@ def check_clearance(
         pairs=proof.pairs,
         least=proof.least,
         counts=proof.counts,
-        deepest=lambda k, worst: is_deepest(worst, ball_of(problem, proof.pairs[k])),
+        deepest=lambda k, worst: is_deepest(worst, proof.asked.ball(k)),
         counterexamples=counterexamples,
         nominal=nominal,
         contacts=contacts,

@@ -16,7 +16,6 @@ from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, TIME
 from vdsm_pin.proof.paths import Path, together
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.proof.tree import Tree
@@ -132,16 +131,6 @@ class Knots:
         """The same as shares of the trajectory's intervals; [-]."""
         found = self.moments(inner, share) - self.interval(inner)
         return np.minimum(np.maximum(found, 0.0), 1.0)
-
-    def in_rows(self, best: FloatArray) -> FloatArray:
-        """Best rows of pairs (`proof.layouts`) in intervals of the trajectory."""
-        if self.are_rows:
-            return best
-        found, inner = best.copy(), best[:, AT_UPPER].astype(np.int64)
-        found[:, TIME] = self.share(inner, best[:, TIME])
-        found[:, AT_UPPER] = self.interval(inner)
-        found[:, AT_LOWER] = self.interval(best[:, AT_LOWER].astype(np.int64))
-        return found
 
 
 def joined_path(path: Path, scene: Scene) -> tuple[Path, Knots]:

@@ -8,7 +8,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import ClearanceProof
 
@@ -58,10 +57,11 @@ class LowersSink:
 
     def proved(self, proof: ClearanceProof) -> ProvedLowers:
         """The bounds of the intervals, and of the whole motion for other pairs."""
-        column = np.full(len(proof.best), -1)
+        least = proof.least.lower
+        column = np.full(len(least), -1)
         lower = np.zeros((1, 1))
         whole = proof.sent == proof.n_intervals and self._size <= COMPARED
         if self._pairs.size and whole:
             column[self._pairs] = np.arange(self._pairs.size)
             lower = np.concatenate(self._parts)
-        return ProvedLowers(proof.best[:, LOW], column, lower)
+        return ProvedLowers(least, column, lower)

@@ -7,9 +7,13 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.proving import Proving, new_proving
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import Proof, summed
+from vdsm_pin.proof.proving import Proving
+from vdsm_pin.proof.question import Question
+from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.moving import Knots, whole_path
-from vdsm_pin.verification.task import make_task
+from vdsm_pin.verification.task import arm_assembly
 
 BUDGET = Budget()
 
@@ -19,17 +23,28 @@ class ProblemProof:
     """A proof at work, and where its intervals lie in the trajectory.
 
     Args:
-        proving: Numbers the intervals of the joint path.
-        knots: Those of the trajectory.
+        asked: What is held apart.
+        question: The same under errors.
+        path: The motion of all that moves.
+        knots: Where its intervals lie in the trajectory.
+        proving: Numbers the intervals of the path.
     """
 
-    proving: Proving
+    asked: Assembly
+    question: Question
+    path: Path
     knots: Knots
+    proving: Proving
 
-    @property
-    def best(self) -> FloatArray:
-        """Least bounds of each pair, told in intervals of the trajectory."""
-        return self.knots.in_rows(self.proving.results.best)
+    def rows(self, moments: FloatArray) -> FloatArray:
+        """Rows of all columns at moments in waypoints, (m,) to (m, n_columns)."""
+        return self.path.at_moments(self.knots.inner(moments))
+
+    def told(self, *, in_time: bool = True) -> Proof:
+        """What was proved so far, in intervals of the path."""
+        return summed(
+            self.proving.results, self.question.plan, self.question.n_pairs, in_time
+        )
 
 
 def prove_problem(
@@ -47,8 +62,6 @@ def prove_problem(
         budget: Sizes and when to stop.
     """
     path, knots = whole_path(problem, trajectory)
-    task = make_task(problem, errors, budget, path.reach)
-    n_obstacles = len(problem.scene.obstacles)
-    columns = problem.manipulator.n_links + n_obstacles
-    proving = new_proving(task, path.packed(), columns, n_obstacles, budget)
-    return ProblemProof(proving, knots)
+    asked = arm_assembly(problem)
+    question = asked.question.under(asked.box(errors))
+    return ProblemProof(asked, question, path, knots, question.about(path, budget))

@@ -18,14 +18,14 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.terms import UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.arm_counterexamples import erring_pair, of_best
+from vdsm_pin.verification.assembly import obstacle_growth
+from vdsm_pin.verification.clearances import in_rows, least_clearances
 from vdsm_pin.verification.counterexample import Search
+from vdsm_pin.verification.counterexamples import erring_pair, starts
 from vdsm_pin.verification.proving import prove_problem
-from vdsm_pin.verification.task import ArmPairs, obstacle_growth
 from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
 
 LARGEST: Final = float(np.deg2rad(45.0))
@@ -279,12 +279,14 @@ def _smallest(
     budget = Budget(slices=LOOKS, profile=1, until=deadline.end)
     proof = prove_problem(problem, trajectory, errors, budget=budget)
     proof.proving.sweep(0, proof.proving.n_intervals)
-    best, counts = proof.best, proof.proving.results.counts
+    told, counts = proof.told(), proof.proving.results.counts
     among = np.flatnonzero(counts[:, UNDECIDED] > 0)
-    nearest = among[np.argsort(best[among, LOW], kind="stable")][:SOUGHT]
-    pairs, searches = ArmPairs(problem), []
+    nearest = among[np.argsort(told.lower[among], kind="stable")][:SOUGHT]
+    least = in_rows(least_clearances(proof.asked, told), proof.knots)
+    weakest = proof.knots.interval(told.lower_interval)
+    searches = []
     for k in nearest.tolist():
         deadline.check()
-        search = Search(erring_pair(problem, trajectory, pairs.pair(k), errors))
-        searches.append(search.smallest(of_best(best[k])))
+        search = Search(erring_pair(proof.asked, proof.rows, k, errors))
+        searches.append(search.smallest(starts(least, weakest, k)))
     return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]

@@ -14,14 +14,9 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import with_hulls
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.approaches import closest_approaches
-from vdsm_pin.verification.arm_counterexamples import (
-    find_counterexamples,
-    with_meetings,
-)
 from vdsm_pin.verification.best_effort import BestEffort, guarded
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.clearance import (
@@ -111,7 +106,7 @@ def verify(
     if sinks and proof.sent < proof.n_intervals:
         judgement.extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
-    near_misses = closest_approaches(problem, trajectory, proof.pairs, least)
+    near_misses = closest_approaches(problem, trajectory, proof.asked, least)
     log = CoalLog(near_misses, tuple(enclosed))
     clearance = check_clearance(
         problem, proof, counterexamples, contacts, deadline, nominal=clear
@@ -212,15 +207,14 @@ class _Judgement:
             deadline=self.deadline,
             reach=math.inf if inside else reach,
         )
-        proof = with_meetings(problem, trajectory, proof, self.deadline)
+        proof = proof.with_meetings(self.deadline)
         too_close = noted.noted if proof.sent == proof.n_intervals else None
         return _Proved(proof, lowers.proved(proof), too_close)
 
     def counterexamples(self, proof: ClearanceProof) -> tuple[Counterexample, ...]:
         """Motions within the errors that come too close."""
-        motion = self.problem, self.trajectory, self.problem.errors
-        name, asked = "search for counterexamples", (*motion, proof, self.deadline)
-        return self.extras.take(name, (), find_counterexamples, *asked)
+        name, asked = "search for counterexamples", (self.problem.errors, self.deadline)
+        return self.extras.take(name, (), proof.counterexamples, *asked)
 
     def is_nominally_clear(self) -> bool:
         """Whether the motion without errors is proved clear of everything."""
@@ -260,7 +254,7 @@ class _Judgement:
         hulls, hulled = unlocated(locate_start(problem, motion)), problem
         if hulls:  # else with what the problem keeps packed
             hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
-        lower = np.append(proof.best[:, LOW], np.inf)  # -1 is no pair
+        lower = np.append(proof.least.lower, np.inf)  # -1 is no pair
         least = lower[ArmPairs(problem).number].min(axis=0)
         least[[name in hulls for name in problem.scene.names]] = -math.inf
         known, take = (self.deadline, least), self.extras.take

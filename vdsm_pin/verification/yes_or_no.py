@@ -9,11 +9,12 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.blocks import sweep
 from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.packing import with_errors
 from vdsm_pin.proof.workspace import forget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.proving import prove_problem
-from vdsm_pin.verification.task import with_errors
+from vdsm_pin.verification.moving import whole_path
+from vdsm_pin.verification.task import arm_assembly
 
 BEYOND: Final = 4.0 * TOLERANCES.bracket_gap
 """Clearance asked for beyond the required one; [m].
@@ -38,11 +39,12 @@ class YesOrNoProof:
         trajectory: Trajectory,
         deadline: Deadline = NO_LIMIT,
     ) -> None:
-        self._problem = problem
         # Nobody asks for a profile: all intervals share its one bin.
         budget = Budget(profile=1, until=deadline.end)
-        proof = prove_problem(problem, trajectory, ErrorBox(), budget=budget)
-        self._proving, self._first = proof.proving, proof.knots.first.tolist()
+        path, knots = whole_path(problem, trajectory)
+        self._asked = arm_assembly(problem)
+        self._proving = self._asked.question.about(path, budget)
+        self._first = knots.first.tolist()
         self._deadline = deadline
         task = self._proving.task
         pairs = task.pairs._replace(required=task.pairs.required + BEYOND)
@@ -57,7 +59,8 @@ class YesOrNoProof:
         Raises:
             OutOfTime: If the time is over.
         """
-        known, task = self._proving, with_errors(self._task, self._problem, errors)
+        box = self._asked.question.under(self._asked.box(errors)).errors
+        known, task = self._proving, with_errors(self._task, box)
         # Pairs that remember nothing: the answer depends on the question alone.
         forget(known.work.planes)
         # No least clearance is asked for: whatever is proved may be culled.

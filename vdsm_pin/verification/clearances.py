@@ -1,0 +1,123 @@
+"""The least clearance of every pair, and a ball in both bodies where they meet."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import Proof
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.assembly import Assembly
+from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
+from vdsm_pin.verification.contacts import BESIDE, MEETING, common_ball
+from vdsm_pin.verification.moving import Knots
+
+
+def least_clearances(asked: Assembly, proof: Proof) -> LeastClearances:
+    """What a proof says of every pair, the witness on the link first."""
+    points = proof.points.copy()
+    points[asked.outer] = points[asked.outer, ::-1]
+    return LeastClearances(
+        interval=proof.interval,
+        share=proof.share,
+        lower=proof.lower,
+        upper=proof.upper,
+        verdict=proof.verdict,
+        link_point=frozen(points[:, 0]),
+        other_point=frozen(points[:, 1]),
+    )
+
+
+def with_depths(
+    asked: Assembly,
+    path: Path,
+    least: LeastClearances,
+    enough: float = np.inf,
+    span: FloatArray | None = None,
+) -> LeastClearances:
+    """The same, with the depths that balls in both bodies prove.
+
+    Args:
+        asked: What is held apart.
+        path: Of all that moves.
+        least: What is proved along it.
+        enough: No ball deeper than this is looked for; [m].
+        span: From when to when it is, in knots of the path; None for all of it.
+    """
+    near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
+    span = np.array([0.0, path.n_intervals]) if span is None else span
+    return with_balls(asked, path, least, np.flatnonzero(near), enough, span)
+
+
+def with_balls(
+    asked: Assembly,
+    path: Path,
+    least: LeastClearances,
+    pairs: IntArray,
+    enough: float,
+    span: FloatArray,
+    deadline: Deadline = NO_LIMIT,
+) -> LeastClearances:
+    """The same, some pairs refuted by balls in both that are deeper than is proved.
+
+    Args:
+        asked: What is held apart.
+        path: Of all that moves.
+        least: What is proved along it.
+        pairs: Numbers of those that are looked at.
+        enough: No ball deeper than this is looked for; [m].
+        span: From when to when it is, in knots of the path, shape (2,).
+        deadline: When to leave it at what was found.
+    """
+    changed = dict[int, tuple[Any, ...]]()
+    beside = min(1.0, span[1] - span[0]) * BESIDE
+    for k in pairs.tolist():
+        if deadline.passed:
+            break
+        moment = least.interval[k] + least.share[k]
+        middle = 0.5 * (least.link_point[k] + least.other_point[k])
+        intervals, shares = path.split(np.clip(moment + beside, *span))
+        for at, pose in enumerate(asked.poses(path.within(intervals, shares))):
+            radius, centre = common_ball(*asked.placed(k, pose), middle, enough)
+            if radius > max(0.0, -float(least.upper[k])):
+                when = intervals[at], shares[at], least.lower[k]
+                changed[k] = *when, -radius, REFUTED, centre, centre
+                break
+    return least.with_rows(changed)
+
+
+def in_rows(least: LeastClearances, knots: Knots) -> LeastClearances:
+    """The same, its moments in intervals of the trajectory."""
+    if knots.are_rows:
+        return least
+    share = knots.share(least.interval, least.share)
+    return replace(least, interval=knots.interval(least.interval), share=share)
+
+
+def profile_of(
+    profile: FloatArray, stride: int, knots: Knots, n_links: int
+) -> ClearanceProfile:
+    """Brackets along a motion, by intervals of its trajectory.
+
+    Args:
+        profile: By column in bins of intervals of the joint path, those of links first,
+            shape (2, n_columns, n_bins); [m].
+        stride: Intervals of a bin.
+        knots: Of the trajectory.
+        n_links: Columns of links.
+    """
+    first = np.arange(profile.shape[2]) * stride
+    if not knots.are_rows:
+        first, begins = np.unique(knots.interval(first), return_index=True)
+        profile = np.minimum.reduceat(profile, begins, axis=2)
+    profile.setflags(write=False)
+    return ClearanceProfile(
+        link_lower=profile[0, :n_links].T,
+        link_upper=profile[1, :n_links].T,
+        obstacle_lower=profile[0, n_links:].T,
+        obstacle_upper=profile[1, n_links:].T,
+        first_interval=frozen(first, np.int64),
+    )
