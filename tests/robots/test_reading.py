@@ -250,6 +250,22 @@ def test_a_link_that_may_be_scaled_once_too_often_is_noted(
     assert odd == ([f"{words} without a scale?"] if noted else [])
 
 
+@pytest.mark.parametrize(("share", "noted"), [(0.99, False), (1.01, True)])
+def test_a_link_far_larger_than_all_joints_reach_is_noted(
+    share: float, noted: bool, tmp_path: Path
+) -> None:
+    """Eight along x, against five times the way from joint to joint, in inches say."""
+    octahedron(tmp_path)
+    reach = read_robot(RobotFiles(write(tmp_path, "two.urdf", URDF))).reach
+    scale = share * 5.0 * reach / 8.0
+    mesh = f'<mesh filename="two.obj" scale="{scale} {scale} {scale}"/>'
+    text = URDF.replace('<sphere radius="0.1"/>', mesh)
+    notes = read_robot(RobotFiles(write(tmp_path, "mesh.urdf", text))).notes
+    odd = [note for note in notes if "two.obj" in note]
+    assert len(odd) == noted
+    assert all("'arm'" in note and "in inches" in note for note in odd)
+
+
 def test_covers_of_a_mesh_hold_all_of_it(tmp_path: Path) -> None:
     octahedron(tmp_path)
     mesh = '<mesh filename="two.obj" scale="0.1 0.1 0.1"/>'

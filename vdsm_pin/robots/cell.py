@@ -159,7 +159,7 @@ def cell_of(
         raise InvalidInput(message)
     else:
         file = Path(scene)
-        solids, of_files = read_scene_with_files(file, _size(read), _others(read))
+        solids, of_files = read_scene_with_files(file, read.reach, _others(read))
         named = (*named, file)
     source = replace(source_of(named, of_files), is_whole=False)
     return Cell(read, solids, *required).read_from(source)
@@ -177,7 +177,7 @@ def read_cell(path: str | Path) -> Cell:
     file = read_cell_file(Path(path))
     robot = read_robot(file.robot)
     required, required_self = file.required
-    found = file.scene(_size(robot), _others(robot), read_other)
+    found = file.scene(robot.reach, _others(robot), read_other)
     cell = Cell(
         robot=robot,
         scene=found.scene,
@@ -212,9 +212,3 @@ def locks(words: tuple[str, ...]) -> dict[str, float]:
 def _others(robot: Robot) -> list[str]:
     """Names of the links besides those that stand as the root link does."""
     return [name for name, frame in robot.frames.items() if frame != ROOT_FRAME]
-
-
-def _size(robot: Robot) -> float:
-    """How far the robot reaches at most, roughly; [m]."""
-    shifts = [np.linalg.norm(joint.placement[:3, 3]) for joint in robot.tree.joints]
-    return float(sum(shifts)) or 1.0

@@ -27,6 +27,9 @@ from vdsm_pin.units import MM_PER_M
 LARGEST_LINK: Final = 20.0
 """A link's mesh larger than this must be in another unit; [m]."""
 
+MOST_REACHES: Final = 5.0
+"""A link's mesh larger than this times the way along all joints is noted; [-]."""
+
 SMALLEST_LINK: Final = 2e-3
 """A link's mesh smaller than this may be scaled once too often, and is noted; [m]."""
 
@@ -52,6 +55,14 @@ class LinkReader:
     solids: MeshCover = HULLS
     covers: dict[str, list[MeshPieces]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    _sizes: list[tuple[str, str, float]] = field(default_factory=list)
+
+    def too_large(self, reach: float) -> Iterator[str]:
+        """Notes on meshes that were read, too large beside the robot's reach; [m]."""
+        for link, name, size in self._sizes:
+            if size > MOST_REACHES * reach:
+                odd = f"its mesh {name!r} is {size:.3g} m large, all joints {reach:.3g}"
+                yield f"link {link!r}: {odd} m apart; is it in inches, or centimetres?"
 
     def pieces(self, link: ET.Element) -> tuple[LinkPiece, ...]:
         """The convex pieces of a link, in its frame, which hold all of it.
@@ -136,6 +147,7 @@ class LinkReader:
                 'millimetres? expected scale="0.001 0.001 0.001"'
             )
             raise self._invalid(link, problem)
+        self._sizes.append((link, name, size))
         if size < SMALLEST_LINK:
             odd = f"its mesh {name!r} is {MM_PER_M * size:.3g} mm large"
             self.notes.append(f"link {link!r}: {odd}; is it in metres without a scale?")

@@ -64,6 +64,12 @@ class RobotJoint:
         return f"narrowed by limits of what mimics it: {names}" if names else ""
 
 
+def reach_of(tree: Tree) -> float:
+    """The way along all joints of a tree in one; 1 where there is none; [m]."""
+    shifts = [np.linalg.norm(joint.placement[:3, 3]) for joint in tree.joints]
+    return float(sum(shifts)) or 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A robot as it is judged.
@@ -100,6 +106,11 @@ class Robot:
     covers: Mapping[str, Sequence[tuple[IntArray, ...] | Hull]] = field(
         default_factory=dict
     )
+
+    @property
+    def reach(self) -> float:
+        """How far it reaches at most, roughly; 1 where all is in one place; [m]."""
+        return reach_of(self.tree)
 
     @property
     def values(self) -> Values:

@@ -13,7 +13,7 @@ from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.joints import JointReader, Moving
 from vdsm_pin.robots.link_solids import LinkReader
-from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.model import Robot, reach_of
 from vdsm_pin.robots.pairs import held_pairs
 from vdsm_pin.robots.srdf import Srdf
 from vdsm_pin.robots.xacro import urdf_text
@@ -45,6 +45,7 @@ def read_robot(files: RobotFiles) -> Robot:
     tree = Tree(tuple(reader.joints))
     disabled = more.disabled() if more is not None else {}
     unknown = more.notes() if more is not None else ()
+    odd = (*links.notes, *links.too_large(reach_of(tree)))
     held, left_out = held_pairs(tree, bodies, disabled, more is None)
     return Robot(
         name=document.get("name", urdf.stem),
@@ -57,7 +58,7 @@ def read_robot(files: RobotFiles) -> Robot:
         left_out=left_out,
         base=base,
         solids=solids,
-        notes=(*reader.notes, *unknown, *links.notes, *_not_judged(document)),
+        notes=(*reader.notes, *unknown, *odd, *_not_judged(document)),
         more_files=(*included, *links.meshes(document)),
         covers=links.covers,
     )
