@@ -15,6 +15,7 @@ TARGET: Final = ROOT / "docs" / "dependencies.md"
 USES: Final = {
     "pin": "Pinocchio: the arm from its URDF, kinematics as a second opinion",
     "coal": "distances that steer planning, and a second opinion on clearances",
+    "yourdfpy": "reads URDF",
     "numpy": "arrays",
     "meshcat": "the live 3D view",
     "numba": "compiles what runs fast, once",

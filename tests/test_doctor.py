@@ -26,7 +26,7 @@ def test_an_installation_that_runs_the_tests_lacks_nothing_it_needs() -> None:
     needed = [one for one in examine() if one.needed]
     assert len(needed) > 10
     assert all(one.works for one in needed)
-    assert {"coal", "pin", "numba", "numpy"} <= {one.what for one in needed}
+    assert {"coal", "pin", "yourdfpy", "numba", "numpy"} <= {one.what for one in needed}
 
 
 def test_a_missing_library_is_named_with_its_remedy(

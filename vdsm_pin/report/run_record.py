@@ -13,7 +13,7 @@ from vdsm_pin import __version__
 from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.text import printable
 
-_LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "meshcat")
+_LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "yourdfpy", "meshcat")
 
 
 @dataclass(frozen=True)
