@@ -1,9 +1,8 @@
 """Parts of readers by themselves; oracle: the rule of each, written out."""
 
-import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,54 +18,50 @@ from vdsm_pin.io.urdf_arm import _Reading
 HERE = Path("arm.urdf")
 
 
-def made(tag: str, *children: ET.Element, **attributes: object) -> ET.Element:
-    element = ET.Element(tag, {key: str(value) for key, value in attributes.items()})
-    element.extend(children)
-    return element
+def at(x: float, y: float = 0.0, z: float = 0.0) -> Any:
+    pose = np.eye(4)
+    pose[:3, 3] = x, y, z
+    return pose
 
 
-def at(x: float, y: float = 0.0, z: float = 0.0, pitch: float = 0.0) -> ET.Element:
-    return made("origin", xyz=f"{x} {y} {z}", rpy=f"0 {pitch} 0")
+def along_x(x: float, y: float = 0.0, z: float = 0.0) -> Any:
+    """A pose whose z axis is the x axis of the link."""
+    pose = at(x, y, z)
+    pose[:3, :3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
+    return pose
 
 
-def shape(origin: ET.Element, kind: str, **sizes: float) -> ET.Element:
-    return made("collision", origin, made("geometry", made(kind, **sizes)))
+def joint(name: str, kind: str, axis: Any, parent: str, child: str, x: float) -> Any:
+    limit = SimpleNamespace(lower=-0.5, upper=0.5)
+    return SimpleNamespace(
+        name=name, type=kind, axis=np.array(axis, float), parent=parent, child=child,
+        origin=at(x), limit=limit, mimic=None,
+    )  # fmt: skip
 
 
-def joint(k: int, name: str, kind: str, axis: str, x: float) -> ET.Element:
-    """Joint k of a chain, from link k to link k + 1."""
-    ends = made("parent", link=f"f{k}"), made("child", link=f"f{k + 1}")
-    limit = made("limit", lower=-0.5, upper=0.5)
-    return made(
-        "joint", *ends, at(x), limit, made("axis", xyz=axis), name=name, type=kind
-    )
-
-
-def robot(lengths: list[float], joints: int | None = None) -> ET.Element:
+def robot(lengths: list[float], joints: int | None = None) -> Any:
     """A rail, a yaw and a pitch for each link, and a tip."""
-    found = [joint(0, "x0", "prismatic", "1 0 0", 0.0)]
-    give(found[0], "limit", lower=-1.0, upper=2.0)
+    found = [joint("x0", "prismatic", [1, 0, 0], "base", "f0", 0.0)]
+    found[0].limit = SimpleNamespace(lower=-1.0, upper=2.0)
     for k in range(2 * len(lengths) if joints is None else joints):
         x = lengths[k // 2 - 1] if k and k % 2 == 0 else 0.0
-        axis = "0 1 0" if k % 2 else "0 0 1"
-        found.append(joint(k + 1, f"a{k}", "revolute", axis, x))
-    found.append(joint(len(found), "tip", "fixed", "1 0 0", lengths[-1]))
-    links = [made("link", name=f"f{k}") for k in range(len(found) + 1)]
+        axis = [0, 1, 0] if k % 2 else [0, 0, 1]
+        found.append(joint(f"a{k}", "revolute", axis, f"f{k}", f"f{k + 1}", x))
+    last = found[-1].child
+    found.append(joint("tip", "fixed", [1, 0, 0], last, "tip", lengths[-1]))
+    links = [
+        SimpleNamespace(name=n, collisions=[])
+        for n in ("base", *(j.child for j in found))
+    ]
     for k, length in enumerate(lengths):
+        shape = SimpleNamespace(
+            sphere=None, cylinder=SimpleNamespace(radius=0.1 + k, length=length)
+        )
         if 2 * k + 3 < len(links):
-            middle = at(length / 2.0, pitch=np.pi / 2.0)
-            rod = shape(middle, "cylinder", radius=0.1 + k, length=length)
-            links[2 * k + 3].append(rod)
-    return made("robot", *links, *found, name="arm")
-
-
-def give(element: ET.Element, tag: str, **attributes: object) -> None:
-    """Other attributes for a child; no child for none."""
-    child = element.find(tag)
-    assert child is not None
-    element.remove(child)
-    if attributes:
-        element.append(made(tag, **attributes))
+            links[2 * k + 3].collisions.append(
+                SimpleNamespace(geometry=shape, origin=along_x(length / 2.0))
+            )
+    return SimpleNamespace(name="arm", joints=found, links=links)
 
 
 @pytest.mark.parametrize("lengths", [[1.0, 2.0], [0.5, 0.25, 4.0]])
@@ -81,45 +76,59 @@ def test_a_chain_is_an_arm_of_the_shifts_between_its_joints(
     assert found.base_range == (-1.0, 2.0)
 
 
-def changed(number: int, tag: str, **attributes: object) -> Callable[..., None]:
-    """A change of a child of one joint."""
-    return lambda arm: give(arm.findall("joint")[number], tag, **attributes)
+def shifted_rail(arm: Any) -> None:
+    arm.joints[0].origin = at(0.1)
 
 
-def no_origin(arm: ET.Element) -> None:
-    for one in arm.findall("joint")[:2]:
-        give(one, "origin")
+def shifted_yaw(arm: Any) -> None:
+    arm.joints[1].origin = at(0.1)
 
 
-def bare(arm: ET.Element) -> None:
-    for link in arm.findall("link"):
-        for one in link.findall("collision"):
-            link.remove(one)
+def no_origin(arm: Any) -> None:
+    arm.joints[0].origin = arm.joints[1].origin = None
 
 
-ASIDE = "0.1 0 0"
-TURNED = changed(5, "axis", xyz="0 1 0")
+def shifted_pitch(arm: Any) -> None:
+    arm.joints[2].origin = at(0.1)
+
+
+def aside(arm: Any) -> None:
+    arm.joints[3].origin = at(1.0, 0.0, 0.1)
+
+
+def other_limit(arm: Any) -> None:
+    arm.joints[4].limit = SimpleNamespace(lower=-0.5, upper=0.4)
+
+
+def one_sided(arm: Any) -> None:
+    arm.joints[1].limit = SimpleNamespace(lower=-0.4, upper=0.5)
+
+
+def turned(arm: Any) -> None:
+    arm.joints[5].axis = np.array([0.0, 1.0, 0.0])
+
+
+def bare(arm: Any) -> None:
+    for link in arm.links:
+        link.collisions = []
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         (no_origin, None),
-        (changed(0, "origin", xyz=ASIDE), "'a0'.*joint 1 at the base's origin"),
-        (changed(1, "origin", xyz=ASIDE), "'a0'.*joint 1 at the base's origin"),
-        (changed(2, "origin", xyz=ASIDE), "'a1'.*its origin on that of the yaw"),
-        (changed(3, "origin", xyz="1 0 0.1"), "'a2'.*x axis"),
-        (
-            changed(4, "limit", lower=-0.5, upper=0.4),
-            r"'a3'.*has limits \(-0.5, 0.4\), expected \(-0.5, 0.5\)",
-        ),
-        (changed(1, "limit", lower=-0.4, upper=0.5), r"'a0'.*has limits \(-0.4, 0.5\)"),
-        (TURNED, "'a4'.*slides along 0 1 0, expected 0 0 1"),
+        (shifted_rail, "'a0'.*joint 1 at the base's origin"),
+        (shifted_yaw, "'a0'.*joint 1 at the base's origin"),
+        (shifted_pitch, "'a1'.*expected its origin on that of the yaw"),
+        (aside, "'a2'.*x axis"),
+        (other_limit, r"'a3'.*has limits \(-0.5, 0.4\), expected \(-0.5, 0.5\)"),
+        (one_sided, r"'a0'.*has limits \(-0.4, 0.5\)"),
+        (turned, "'a4'.*slides along 0 1 0, expected 0 0 1"),
         (bare, "no collision shape"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_such_arm_is_named(change: Any, said: str | None) -> None:
-    arm = robot([1.0, 2.0, 3.0] if change is TURNED else [1.0, 2.0])
+    arm = robot([1.0, 2.0, 3.0] if change is turned else [1.0, 2.0])
     change(arm)
     if said is None:
         assert _Reading(HERE, arm).arm(b"").link_lengths.tolist() == [1.0, 2.0]
@@ -145,30 +154,39 @@ def test_shapes_lie_on_the_axis_of_their_link() -> None:
         rod, off = bool(rng.integers(2)), rng.choice([0.0, 0.0, 1e-3], 2)
         length, reach = float(rng.choice([0.5, 1.0])), float(rng.choice([0.5, 1.0]))
         x = float(rng.choice([0.0, 0.25, 0.5, 0.75, 1.0]))
-        along = rng.random() < 0.7
-        # A little about either axis across, or not.
-        yaw, more = [(1e-3, 0.0), (0.0, 1e-3), (0.0, 0.0), (0.0, 0.0)][rng.integers(4)]
-        pitch = (np.pi / 2.0 if along else 0.0) + more
-        origin = made("origin", xyz=f"{x} {off[0]} {off[1]}", rpy=f"0 {pitch} {yaw}")
+        pose = along_x(x, *off) if rng.random() < 0.7 else at(x, *off)
+        tilt = rng.integers(4)
+        if tilt < 2:  # a little about either axis across
+            s, turn = 1e-3, np.eye(4)
+            turn[:3, :3] = [[[1, -s, 0], [s, 1, 0], [0, 0, 1]],
+                            [[1, 0, s], [0, 1, 0], [-s, 0, 1]]][tilt]  # fmt: skip
+            turned_by = pose.copy()
+            turned_by[:3, :3] = turn[:3, :3] @ pose[:3, :3]
+            pose = turned_by
+        solid = SimpleNamespace(radius=0.1, length=length)
+        geometry = SimpleNamespace(
+            sphere=None if rod else solid, cylinder=solid if rod else None
+        )
         half = length / 2.0 if rod else 0.0
         on_axis = not off.any() and 0.0 <= x - half and x + half <= reach
-        if rod:  # y and z of its axis, Rz(yaw) Ry(pitch) z
-            across = np.sin(yaw) * np.sin(pitch), np.cos(pitch)
-            on_axis &= bool(np.abs(across).max() < 1e-9)
+        if rod:
+            on_axis &= bool((np.abs(pose[1:3, 2]) < 1e-9).all())
         reading = _Reading(HERE, robot([1.0, 2.0]))
-        sizes = {"radius": 0.1, "length": length} if rod else {"radius": 0.1}
-        one = shape(origin, "cylinder" if rod else "sphere", **sizes)
+        shape = SimpleNamespace(geometry=geometry, origin=pose)
         seen[on_axis] += 1
         if on_axis:
-            assert reading._radius_of("l", one, reach) == 0.1
+            assert reading._radius_of("l", shape, reach) == 0.1
         else:
             with pytest.raises(InvalidFile, match="off the link's axis"):
-                reading._radius_of("l", one, reach)
+                reading._radius_of("l", shape, reach)
     assert min(seen.values()) > 40
-    ball = made("collision", made("geometry", made("sphere", radius=0.2, length=9)))
-    assert reading._radius_of("l", ball, 0.0) == 0.2
+    ball = SimpleNamespace(sphere=SimpleNamespace(radius=0.2), cylinder=None)
+    assert (
+        reading._radius_of("l", SimpleNamespace(geometry=ball, origin=None), 0.0) == 0.2
+    )
+    none = SimpleNamespace(geometry=SimpleNamespace(sphere=None, cylinder=None))
     with pytest.raises(InvalidFile, match="neither a sphere nor a cylinder"):
-        reading._radius_of("l", shape(at(0.0), "box", size=1.0), 1.0)
+        reading._radius_of("l", none, 1.0)
 
 
 @pytest.mark.parametrize(
