@@ -13,6 +13,7 @@ import numpy as np
 from PIL import Image
 
 import vdsm_pin as vp
+from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.film import Shot, pictures
 from vdsm_pin.report.gltf import play_times
 from vdsm_pin.report.html import view_page
@@ -28,11 +29,12 @@ SHOT: Final = Shot(look=(0.5, -1.2, 0.3), width=1520, height=680)
 COLOURS: Final = 200
 
 
-def moments(problem: vp.Problem, motion: vp.Trajectory, count: int) -> list[float]:
+def moments(drawing: ArmDrawing, count: int) -> list[float]:
     """Waypoints at which what moves most has gone on by the same way."""
-    times = play_times(problem, motion, SECONDS)
+    rows = np.arange(float(drawing.trajectory.n_samples))
+    times = play_times(drawing, rows, SECONDS)
     clock = np.linspace(0.0, times[-1], count)
-    return np.interp(clock, times, np.arange(len(times))).tolist()
+    return np.interp(clock, times, rows).tolist()
 
 
 def animation(frames: list[bytes]) -> list[Image.Image]:
@@ -54,9 +56,9 @@ def animation(frames: list[bytes]) -> list[Image.Image]:
 def main() -> None:
     """Plan, draw and write the picture."""
     problem = vp.read_problem(PROBLEM)
-    motion = vp.plan(problem).trajectory
-    shown = moments(problem, motion, FRAMES)
-    drawn = pictures(view_page(problem, motion), shown, SHOT, "png", TARGET)
+    drawing = ArmDrawing(problem, vp.plan(problem).trajectory)
+    shown = moments(drawing, FRAMES)
+    drawn = pictures(view_page(drawing), shown, SHOT, "png", TARGET)
     first, *rest = animation(drawn)
     each = [round(1000.0 * SECONDS / FRAMES)] * FRAMES
     each[-1] = 1500

@@ -4,10 +4,12 @@ import io
 import json
 import shutil
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio
 import pytest
 import trimesh
 from made_up import problem as made_up_problem
@@ -16,14 +18,19 @@ from PIL import Image
 from problem_files import NEAR, write_problem
 
 from vdsm_pin.app.export import ExportOrder, export
+from vdsm_pin.app.new_project import new_project
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.film import Shot, pictures
 from vdsm_pin.report.gltf import glb, play_times
 from vdsm_pin.report.html import view_page
+from vdsm_pin.report.robot_drawing import RobotDrawing
+from vdsm_pin.robots.cell import read_cell
+from vdsm_pin.robots.trajectory_files import read_motion
 
 Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
 
@@ -58,7 +65,7 @@ def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def test_gltf_moves_every_link_as_the_arm_does() -> None:
     task, rows = made_up_problem(), trajectory(60)
-    content, binary = opened(glb(task, rows, 12.0))
+    content, binary = opened(glb(ArmDrawing(task, rows), 12.0))
     (motion,) = content["animations"]
     centres = joint_centres(task.manipulator, rows.x0, rows.alpha, rows.theta)
     frames = link_frames(rows.alpha, rows.theta)
@@ -87,7 +94,9 @@ def test_gltf_moves_every_link_as_the_arm_does() -> None:
 
 def test_a_second_reader_finds_every_body_where_it_is() -> None:
     task = made_up_problem()
-    scene = trimesh.load(io.BytesIO(glb(task, trajectory(2), 1.0)), file_type="glb")
+    scene = trimesh.load(
+        io.BytesIO(glb(ArmDrawing(task, trajectory(2)), 1.0)), file_type="glb"
+    )
     solids = {one.name: one for one in task.scene.obstacles}
     assert solids.keys() | {f"link {k}" for k in range(1, 9)} == set(scene.geometry)
     for name in ("pillar", "ball", "crate"):
@@ -102,7 +111,8 @@ def test_a_motion_plays_evenly_by_what_moves_most_and_by_its_own_times() -> None
     task, rows = made_up_problem(), trajectory(60)
     centres = joint_centres(task.manipulator, rows.x0, rows.alpha, rows.theta)
     most = np.linalg.norm(np.diff(centres, axis=0), axis=2).max(axis=1)
-    speed = most / np.diff(play_times(task, rows, 7.0))
+    drawing = ArmDrawing(task, rows)
+    speed = most / np.diff(play_times(drawing, np.arange(60.0), 7.0))
     np.testing.assert_allclose(speed, speed[0], rtol=1e-4)
 
 
@@ -153,7 +163,7 @@ class TestWithABrowser:
     def test_a_picture_has_its_size_and_shows_another_moment_differently(
         self, tmp_path: Path
     ) -> None:
-        page = view_page(made_up_problem(), trajectory(60))
+        page = view_page(ArmDrawing(made_up_problem(), trajectory(60)))
         shot = Shot("side", 640, 360)
         first, same, other = pictures(page, [0.0, 0.0, 20.0], shot, "png", tmp_path)
         seen = [Image.open(io.BytesIO(one)) for one in (first, same, other)]
@@ -188,9 +198,53 @@ class TestWithABrowser:
         program.write_text("#!/bin/sh\nexit 0\n")
         program.chmod(0o755)
         monkeypatch.setenv("CHROMIUM", str(program))
-        page = view_page(made_up_problem(), trajectory(5))
+        page = view_page(ArmDrawing(made_up_problem(), trajectory(5)))
         with pytest.raises(InvalidInput, match="drew 0 of 1 pictures"):
             pictures(page, [0.0], Shot(), "png", tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_gltf_moves_a_robot_s_links_as_pinocchio_does(
+    tmp_path: Path, smooth: bool
+) -> None:
+    """Oracle: Pinocchio's own reading of the URDF, at every moment of the file."""
+    new_project(tmp_path / "cell", "robot")
+    cell = read_cell(tmp_path / "cell" / "problem.yaml")
+    motion = read_motion(tmp_path / "cell" / "plan.csv", cell.robot.joints)
+    if smooth:
+        times = np.arange(float(len(motion.q)))
+        rates = np.gradient(motion.q, axis=0)
+        motion = replace(motion, times=times, rates=rates)
+    drawing = RobotDrawing(cell, motion.path)
+    content, binary = opened(glb(drawing, 9.0))
+    model = pinocchio.buildModelFromUrdf(str(tmp_path / "cell" / "robot.urdf"))
+    data, moments = model.createData(), drawing.told_moments()
+    names = [node["name"] for node in content["nodes"]]
+    found: dict[str, dict[str, np.ndarray]] = {}
+    (played,) = content["animations"]
+    for channel in played["channels"]:
+        sampler = played["samplers"][channel["sampler"]]
+        clock = array(content, binary, sampler["input"])[:, 0]
+        assert clock[-1] == pytest.approx(motion.path.n_intervals if smooth else 9.0)
+        name, path = names[channel["target"]["node"]], channel["target"]["path"]
+        found.setdefault(name, {})[path] = array(content, binary, sampler["output"])
+    assert found.keys() == {body.name for body in cell.robot.bodies}
+    order = [model.joints[model.getJointId(j)].idx_q for j in motion.names]
+    for k, q in enumerate(motion.path.at_moments(moments)):
+        values = np.zeros(model.nq)
+        values[order] = q
+        pinocchio.framesForwardKinematics(model, data, values)
+        for body in cell.robot.bodies:
+            pose = data.oMf[model.getFrameId(body.name)]
+            (piece,) = body.pieces
+            middle = getattr(piece, "centre", None)
+            if middle is None:
+                middle = piece.points.mean(axis=0)  # type: ignore[union-attr]
+            place, turn = found[body.name]["translation"], found[body.name]["rotation"]
+            np.testing.assert_allclose(place[k], pose.act(middle), atol=1e-5)
+            for axis in np.eye(3):
+                at = turned(turn[k].astype(float), axis)
+                np.testing.assert_allclose(at, pose.rotation @ axis, atol=1e-5)
 
 
 @pytest.mark.parametrize("n", [2, 3000])
@@ -210,7 +264,7 @@ required_clearance: 5
     problem = read_problem(file)
     none, angles = np.zeros(n), np.zeros((2, n, 2))
     rows = Trajectory(none > 0, none, none, *angles, times=np.linspace(0.0, 4.0, n))
-    content, binary = opened(glb(problem, rows, 1.0))
+    content, binary = opened(glb(ArmDrawing(problem, rows), 1.0))
     (motion,) = content["animations"]
     numbers = [k for k, node in enumerate(content["nodes"]) if node["name"] == "ball"]
     for channel in motion["channels"]:

@@ -18,7 +18,9 @@ import made_up
 import numpy as np
 import pytest
 
-from vdsm_pin.app.visualization import ViewServer, page, write_page
+from vdsm_pin.app.new_project import new_project
+from vdsm_pin.app.subjects import read_problem_or_cell
+from vdsm_pin.app.visualization import ViewServer, drawing, write_page
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import built_in_text, read_problem
@@ -67,6 +69,23 @@ def test_the_server_hands_out_the_page_and_lets_go_of_its_port() -> None:
         again.bind(("127.0.0.1", port))
 
 
+def test_a_robot_is_shown_with_its_motion_or_where_it_begins(tmp_path: Path) -> None:
+    new_project(tmp_path / "cell", "robot")
+    urdf, problem = tmp_path / "cell" / "robot.urdf", tmp_path / "cell" / "problem.yaml"
+    text = urdf.read_text(encoding="utf-8")
+    low = re.sub(r'lower="[^"]*" upper', 'lower="0.5" upper', text, count=1)
+    urdf.write_text(low, encoding="utf-8")
+    shown = drawing(read_problem_or_cell(problem), None)
+    names = [joint.name for joint in shown.problem.robot.joints]  # type: ignore
+    q = shown.trajectory.knots  # type: ignore[attr-defined]
+    assert low != text and q.tolist() == [[0.5, *[0.0] * (len(names) - 1)]]
+    assert drawing(read_problem_or_cell(problem), problem.parent / "plan.csv")
+    write_page(tmp_path / "v.html", str(problem), problem.parent / "plan.csv")
+    page = (tmp_path / "v.html").read_text(encoding="utf-8")
+    assert '"name":"gripper"' in page and '"nSamples":6' in page
+    assert 'data-look="tip"' not in page
+
+
 def test_a_changed_file_is_noticed_and_a_broken_one_explained(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     write_trajectory(path, made_up.trajectory(4))
@@ -100,7 +119,7 @@ def test_a_page_is_one_file(tmp_path: Path) -> None:
     with pytest.raises(InvalidFile, match="expected a file"):
         write_page(tmp_path, "paper/obs1", None)
     with pytest.raises(InvalidFile):
-        page(made_up.problem(), tmp_path / "absent.csv")
+        drawing(made_up.problem(), tmp_path / "absent.csv")
 
 
 def test_the_meshes_of_a_problem_are_watched_too(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import pytest
 from vdsm_pin import kept
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report import html
+from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.html import (
@@ -127,8 +128,8 @@ def test_a_motion_of_one_row_has_a_report(tmp_path: Path) -> None:
 
 
 def test_the_view_loads_nothing_and_only_a_live_one_asks() -> None:
-    task, rows = made_up.problem(), made_up.trajectory(5)
-    still, live = view_page(task, rows), view_page(task, rows, "abc")
+    shown = ArmDrawing(made_up.problem(), made_up.trajectory(5))
+    still, live = view_page(shown), view_page(shown, "abc")
     assert Page(still).loads == ["data:,"]
     assert "fetch(`changed?seen=" not in still
     assert "fetch(`changed?seen=" in live

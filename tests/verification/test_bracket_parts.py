@@ -587,8 +587,8 @@ def test_contacts_and_counterexamples_stand_in_the_row_of_their_kind() -> None:
 
     near, links = rows((first, alone))
     assert near.where == (
-        "link 2 and a; first too close at waypoint 2.5 (1.0000 s): link 2 and a; "
-        "last at waypoint 7.25 (4.5000 s); 5 intervals in 2 stretches"
+        "link 2 and a; first too close at waypoint 2.5 (1.000 s); "
+        "last at waypoint 7.25 (4.500 s); 5 intervals in 2 stretches"
     )
     assert (near.first_moment, near.last_moment) == (2.5, 7.25)
     assert (near.too_close_intervals, near.too_close_stretches) == (5, 2)

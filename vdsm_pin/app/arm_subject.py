@@ -9,6 +9,8 @@ from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions, check_times, expect
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.arm_drawing import ArmDrawing
+from vdsm_pin.report.postures import at_start
 from vdsm_pin.report.tables import write_cables, write_centres, write_link_angles
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.coal_arm import coal_reach
@@ -54,6 +56,14 @@ class ArmSubject:
         motion = read_trajectory(file, arm, joined)
         check_times(file, self.problem.scene, motion)
         return motion
+
+    def at_start(self) -> Trajectory:
+        """The motion that stays where the arm begins."""
+        return at_start(self.problem)
+
+    def drawing(self, motion: Trajectory) -> ArmDrawing:
+        """How a motion looks."""
+        return ArmDrawing(self.problem, motion)
 
     def checked(self, motion: object) -> Trajectory:
         """The motion itself, if it is a `Trajectory`; `verify` checks that it fits."""

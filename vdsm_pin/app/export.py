@@ -6,12 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.app.visualization import shown_motion
+from vdsm_pin.app.subjects import ProblemOrCell
+from vdsm_pin.app.visualization import drawing
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.atomic import atomic_path
-from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.film import (
     FRAMES_PER_SECOND,
     Shot,
@@ -44,7 +43,7 @@ class ExportOrder:
         shot: How to look.
     """
 
-    problem: PlanningProblem
+    problem: ProblemOrCell
     trajectory: Path | None
     out: Path
     moment: float = 0.0
@@ -59,21 +58,22 @@ def export(order: ExportOrder) -> None:
         InvalidInput: If it cannot be written, or what draws it is missing.
     """
     _check(order)
-    problem = order.problem
-    motion = shown_motion(problem, order.trajectory)
+    shown = drawing(order.problem, order.trajectory)
     with atomic_path(order.out) as file:
         match order.out.suffix.lower():
             case ".glb":
-                file.write_bytes(glb(problem, motion, order.seconds or SECONDS))
+                file.write_bytes(glb(shown, order.seconds or SECONDS))
             case ".png":
-                moment = _within(order.moment, motion)
-                page = view_page(problem, motion)
-                (one,) = pictures(page, [moment], order.shot, "png", order.out)
+                moment = _within(order.moment, shown)
+                (one,) = pictures(
+                    view_page(shown), [moment], order.shot, "png", order.out
+                )
                 file.write_bytes(one)
             case _:
-                moments = _moments(problem, motion, order.seconds)
-                page = view_page(problem, motion)
-                frames = pictures(page, moments, order.shot, "jpeg", order.out)
+                moments = _moments(shown, order.seconds)
+                frames = pictures(
+                    view_page(shown), moments, order.shot, "jpeg", order.out
+                )
                 encode(frames, file, order.out)
 
 
@@ -89,19 +89,18 @@ def _check(order: ExportOrder) -> None:
     check_kept([order.out], [*order.problem.files, *motion])
 
 
-def _within(moment: float, motion: Trajectory) -> float:
-    last = motion.n_samples - 1
+def _within(moment: float, shown: Drawing) -> float:
+    last = shown.trajectory.n_samples - 1
     if not 0.0 <= moment <= last:
         message = f"--moment is {moment:g}, expected a waypoint from 0 to {last}"
         raise InvalidInput(message)
     return moment
 
 
-def _moments(
-    problem: PlanningProblem, motion: Trajectory, seconds: float | None
-) -> list[float]:
+def _moments(shown: Drawing, seconds: float | None) -> list[float]:
     """The moment of each frame of a film, in waypoints."""
-    times: FloatArray = play_times(problem, motion, SECONDS)
+    rows = np.arange(float(shown.trajectory.n_samples))
+    times = play_times(shown, rows, SECONDS)
     if seconds is not None and times[-1] > 0.0:
         times = times * (seconds / times[-1])
     if times[-1] > MOST_SECONDS:
@@ -112,4 +111,4 @@ def _moments(
         raise InvalidInput(message)
     count = max(2, round(float(times[-1]) * FRAMES_PER_SECOND) + 1)
     clock = np.linspace(0.0, times[-1], count)
-    return [float(at) for at in np.interp(clock, times, np.arange(len(times)))]
+    return [float(at) for at in np.interp(clock, times, rows)]

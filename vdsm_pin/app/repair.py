@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from vdsm_pin import __version__
 from vdsm_pin.app.motions import MotionOptions
@@ -16,15 +16,21 @@ from vdsm_pin.app.workflow import (
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.source import check_unchanged, sha256_of_file
 from vdsm_pin.repair.rounds import Repaired
+from vdsm_pin.report.files import VerificationFile
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.verification.records import Verdict, Verification
 
 REPAIR: Final = "repair.json"
 
 
-def repair_to_folder(
-    order: VerifyOrder, pinned: tuple[int, ...] = ()
-) -> Repaired[Verification]:
+class RepairedFiles(NamedTuple):
+    """A repair, and what verification.json says of its trajectory as written."""
+
+    found: Repaired[Verification]
+    file: VerificationFile
+
+
+def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> RepairedFiles:
     """Repair a trajectory; trajectory.csv, repair.json and its verification.
 
     The verification is of trajectory.csv as it was written.
@@ -64,4 +70,4 @@ def repair_to_folder(
         if verified.records.verdict is not Verdict.CERTIFIED:
             message = f"the repaired motion, as written: {verified.file.reason}"
             raise Infeasible(message)
-    return found
+    return RepairedFiles(found, verified.file)

@@ -7,9 +7,12 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions, check_times, expect
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
+from vdsm_pin.report.robot_drawing import RobotDrawing
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.robots.trajectory_csv import csv_text
@@ -50,6 +53,17 @@ class RobotSubject:
         path_of(file, motion)
         check_times(file, self.problem.scene, motion)
         return motion
+
+    def at_start(self) -> JointTrajectory:
+        """The motion that stays with every joint at 0, or at its limit nearest to 0."""
+        joints = self.problem.robot.joints
+        low, high = np.array([(joint.lower, joint.upper) for joint in joints]).T
+        q = np.minimum(np.maximum(0.0, low), high)
+        return JointTrajectory(tuple(joint.name for joint in joints), q[None])
+
+    def drawing(self, motion: JointTrajectory) -> RobotDrawing:
+        """How a motion looks."""
+        return RobotDrawing(self.problem, motion.path)
 
     def checked(self, motion: object) -> JointTrajectory:
         """The motion with its columns in the robot's order, if it has its joints."""

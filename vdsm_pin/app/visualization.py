@@ -14,43 +14,27 @@ from threading import Lock
 from typing import Final
 from urllib.parse import parse_qs, urlsplit
 
-from vdsm_pin.app.problems import read_problem
-from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
+from vdsm_pin.app.subjects import ProblemOrCell, read_problem_or_cell, subject_of
+from vdsm_pin.errors import InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text
-from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.folder import check_kept, check_output_file
 from vdsm_pin.report.html import message_page, view_page
-from vdsm_pin.report.postures import at_start
-from vdsm_pin.verification.moving import untimed
 
 HOST: Final = "127.0.0.1"
 _LONGEST_WAIT: Final = 20.0  # seconds a page waits for one answer
 _LOOK: Final = 0.25  # seconds between looks at the files
 
 
-def page(problem: PlanningProblem, trajectory: Path | None, live: str = "") -> str:
-    """The page of a problem and its motion.
+def drawing(problem: ProblemOrCell, trajectory: Path | None) -> Drawing:
+    """How the motion of a file looks, or the arm or robot where it begins.
 
     Raises:
         InvalidInput: If the trajectory is bad.
     """
-    return view_page(problem, shown_motion(problem, trajectory), live)
-
-
-def shown_motion(problem: PlanningProblem, trajectory: Path | None) -> Trajectory:
-    """The motion of a file, or the arm at the start.
-
-    Raises:
-        InvalidInput: If the trajectory is bad.
-    """
-    if trajectory is None:
-        return at_start(problem)
-    motion = read_trajectory(trajectory, problem.manipulator)
-    if why := untimed(problem.scene, motion):
-        raise InvalidFile(file=trajectory, where="line 1", problem=why)
-    return motion
+    subject = subject_of(problem)
+    motion = subject.at_start() if trajectory is None else subject.read(trajectory)
+    return subject.drawing(motion)
 
 
 def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
@@ -60,10 +44,10 @@ def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
         InvalidInput: If a file is bad or the page cannot be written.
     """
     check_output_file(path)
-    asked = read_problem(problem)
+    asked = read_problem_or_cell(problem)
     motion = () if trajectory is None else (trajectory,)
     check_kept([path], [*asked.files, *motion])
-    write_text(path, page(asked, trajectory))
+    write_text(path, view_page(drawing(asked, trajectory)))
 
 
 class ViewServer(ThreadingHTTPServer):
@@ -88,7 +72,7 @@ class ViewServer(ThreadingHTTPServer):
         self.watch, self.ended = watch, False
         self._files: tuple[Path, ...] = ()
         self._seen, self._page, self._lock = "", "", Lock()
-        shown_motion(self._read(), trajectory)  # bad files are refused at once
+        drawing(self._read(), trajectory)  # bad files are refused at once
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as error:
@@ -111,9 +95,9 @@ class ViewServer(ThreadingHTTPServer):
                 facts.append((0, 0))
         return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
-    def _read(self) -> PlanningProblem:
+    def _read(self) -> ProblemOrCell:
         """Read the problem; from now on its files are watched."""
-        problem = read_problem(self._problem)
+        problem = read_problem_or_cell(self._problem)
         motion = () if self._trajectory is None else (self._trajectory,)
         self._files = (*problem.files, *motion)
         return problem
@@ -125,7 +109,9 @@ class ViewServer(ThreadingHTTPServer):
             if state != self._seen:
                 live = state if self.watch else ""
                 try:
-                    self._page = page(self._read(), self._trajectory, live)
+                    self._page = view_page(
+                        drawing(self._read(), self._trajectory), live
+                    )
                 except VdsmError as error:
                     self._page = message_page(str(error), live)
                 self._seen = state

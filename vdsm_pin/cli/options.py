@@ -46,7 +46,11 @@ OutFolder = Annotated[
     Path, typer.Option("--out", metavar="FOLDER", help="Where the results go.")
 ]
 Trajectory = Annotated[
-    Path, typer.Option(metavar="FILE", help="The motion: rows of joint values (CSV).")
+    Path,
+    typer.Option(
+        metavar="FILE",
+        help="The motion: rows of joint values (CSV); of a robot YAML, JSON, bags too.",
+    ),
 ]
 ShownMotion = Annotated[
     Path | None,
@@ -111,13 +115,15 @@ PlanningTime = Annotated[
     typer.Option(
         min=0.001,
         metavar="SECONDS",
-        help="When to give up (in a batch on each problem); 60 by default, 600 until a "
-        "first plan has been made here and on a cluster, inf for never.",
+        help="When to give up, in a batch on each problem; inf for never. By default "
+        "60, and 600 for the first plan here (it compiles) and on a cluster.",
     ),
 ]
 TimeLimit = Annotated[
     float | None,
-    typer.Option(min=0.001, metavar="SECONDS", help="When to give up."),
+    typer.Option(
+        min=0.001, metavar="SECONDS", help="When to give up; never by default."
+    ),
 ]
 
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]

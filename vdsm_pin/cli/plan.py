@@ -68,9 +68,11 @@ def plan(
         if asked.scene.obstacles:  # without any, little is compiled
             note_planned()
     except OutOfTime as error:  # which tells its time itself
+        compiled = "; compiling took part of it, the next plan is quicker"
         if cold:
             note_planned()
-        error.args = (f"no plan found: {error}{_see(error)}",)
+        said = f"no plan found: {error}{compiled if cold else ''}{_see(error)}"
+        error.args = (said,)
         raise
     except NoPlanFound as error:
         note_planned()

@@ -106,7 +106,7 @@ def urdf(
         str,
         typer.Argument(metavar="ARM", help="A built-in arm, or a problem for its arm."),
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The URDF.")],
     *,
     answer: Answer,
 ) -> None:

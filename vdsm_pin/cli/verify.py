@@ -223,6 +223,7 @@ def repair(
     from vdsm_pin.app.repair import repair_to_folder
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.problem.error_boxes import ErrorBox
+    from vdsm_pin.report.terminal import show_verification
 
     deadline = Deadline.after(time_limit)
     with enforced(deadline, grace=0.0):
@@ -230,15 +231,16 @@ def repair(
     with enforced(deadline):
         options = MotionOptions(deadline, topic=topic)
         order = VerifyOrder(asked, trajectory, out, context.obj, options=options)
-        found = repair_to_folder(order, tuple(pin or ()))
-    new, most = int((found.given < 0).sum()), found.moved.max()
-    changed = f"{new} of them new; moved by {most:.6f} rad or m at most"
-    how = changed if new or most else "none of them moved: it was clear as given"
-    answer.tell(
-        f"certified with {len(found.moved)} waypoints, {how}; wrote {out}",
-        verdict="certified",
-        waypoints=len(found.moved),
-        new=new,
-        moved_at_most=float(most),
-        folder=out,
+        found, file = repair_to_folder(order, tuple(pin or ()))
+    count, new, most = len(found.moved), int((found.given < 0).sum()), found.moved.max()
+    if any(answer):
+        facts = {"waypoints": count, "new": new, "moved_at_most": float(most)}
+        answer.tell("", verdict="certified", **facts, folder=out)
+        return
+    changed = f"{most:.3f} rad, or m of what slides, at a waypoint"
+    show_verification(
+        file,
+        out,
+        ("waypoints", f"{count}, {new} of them new"),
+        ("largest change", changed if new or most else "none: it was clear as given"),
     )

@@ -13,6 +13,7 @@ from vdsm_pin.cli.options import (
     family,
     grouped,
 )
+from vdsm_pin.cli.robot import refuse_beside
 
 commands = family()
 
@@ -109,10 +110,13 @@ def export(
     """
     from vdsm_pin.app.export import ExportOrder
     from vdsm_pin.app.export import export as write
-    from vdsm_pin.app.problems import read_problem
+    from vdsm_pin.app.subjects import read_problem_or_cell
+    from vdsm_pin.problem.planning_problem import PlanningProblem
     from vdsm_pin.report.film import Shot, look_of
 
     shot = Shot(look_of(look), width - width % 2, height - height % 2, numbers)
-    asked = read_problem(problem)
+    asked = read_problem_or_cell(problem)
+    if look == "tip" and not isinstance(asked, PlanningProblem):
+        refuse_beside("a robot", {"--look tip": look})
     write(ExportOrder(asked, trajectory, out, moment, seconds, shot))
     answer.tell(f"wrote {out}", file=out)

@@ -54,7 +54,7 @@ def read_problem(
         line = document.line(("robot",))
         where = "robot" if line is None else f"robot (line {line})"
         others = (
-            "verify, repair, convert, batch --trajectories and, from Python, read_cell"
+            "verify, repair, view, export, convert, batch --trajectories and read_cell"
         )
         what = f"is for {others} only; expected manipulator"
         raise ProblemOfRobot(file=path, where=where, problem=what)

@@ -8,22 +8,33 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.arm.cables import cable_lengths
-from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.kinematics import joint_centres, link_angles, link_frames
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.charts import limit, packed, series
-from vdsm_pin.report.drawing import Silhouette, obstacle_data, row_data, solid_data
+from vdsm_pin.report.drawing import (
+    Part,
+    Silhouette,
+    obstacle_data,
+    row_data,
+    solid_data,
+)
 from vdsm_pin.report.motion_facts import changed_angles
+from vdsm_pin.report.moves import subdivided
 from vdsm_pin.report.palette import link_colours
-from vdsm_pin.report.solids import FINE
-from vdsm_pin.report.thinning import Thinned
+from vdsm_pin.report.solids import FINE, surface
+from vdsm_pin.report.thinning import Thinned, thinned
 from vdsm_pin.units import MM_PER_M
 
 _DASHES: Final = ("", "7 3", "2 3")
 _INK: Final = "currentColor"
+_DARK: Final = "#3b4048"
+_PARTS: Final = 8
+"""Of a smooth piece."""
+
 _MOST_BETWEEN: Final = 4_000
 """Rows that a smooth motion is drawn with, where it has not more itself."""
 
@@ -36,6 +47,17 @@ class ArmDrawing:
     trajectory: Trajectory
 
     @property
+    def extent(self) -> float:
+        """How far obstacles without an end are drawn; [m]."""
+        return self.problem.manipulator.total_length
+
+    @property
+    def path(self) -> FloatArray:
+        """Corners of the desired path, shape (m, 3), none where none is asked; [m]."""
+        path = self.problem.tip_path
+        return np.zeros((0, 3)) if path is None else path.corners
+
+    @property
     def names(self) -> list[str]:
         """Names of the links, in the order of the brackets."""
         return [f"link {i + 1}" for i in range(self.problem.manipulator.n_links)]
@@ -43,9 +65,8 @@ class ArmDrawing:
     def scene(self, obstacles: Sequence[Obstacle]) -> dict[str, Any]:
         """The arm, some obstacles and the desired path; base frame, [m]."""
         problem, arm = self.problem, self.problem.manipulator
-        extent = arm.total_length
         return {
-            **obstacle_data(problem, obstacles, self.trajectory, extent),
+            **obstacle_data(problem, obstacles, self.trajectory, self.extent),
             "lengths": arm.link_lengths.tolist(),
             "radius": arm.link_radius,
             "axes": [
@@ -56,16 +77,11 @@ class ArmDrawing:
             ],
             "colours": list(link_colours(arm.n_links)),
             "carried": [
-                {"link": link, **solid_data(solid, extent, FINE)}
+                {"link": link, **solid_data(solid, self.extent, FINE)}
                 for link, solid in arm.carried
             ],
-            "path": packed(self._corners()),
+            "path": packed(self.path),
         }
-
-    def _corners(self) -> FloatArray:
-        """Corners of the desired path, shape (n, 3); none where none is asked; [m]."""
-        path = self.problem.tip_path
-        return np.zeros((0, 3)) if path is None else path.corners
 
     def motion(self, shown: Thinned) -> dict[str, Any]:
         """The joint values of the rows shown; the page computes the poses from them."""
@@ -105,11 +121,41 @@ class ArmDrawing:
         }
 
     def silhouette(self, moment: float) -> Silhouette:
-        """The links' axes at a moment in waypoints, with the desired path."""
-        arm, pose = self.problem.manipulator, self.trajectory.at(np.array([moment]))
-        centres = joint_centres(arm, pose.x0, pose.alpha, pose.theta)[0]
+        """The links' axes at a moment in waypoints."""
+        arm, centres = self.problem.manipulator, self.points(np.array([moment]))[0]
         links = [centres[i : i + 2] for i in range(arm.n_links)]
-        return Silhouette(links, arm.link_radius, self._corners())
+        return Silhouette(links, arm.link_radius)
+
+    def told_moments(self) -> FloatArray:
+        """The rows that a page shows; of a smooth motion moments between them."""
+        rows = np.arange(float(self.trajectory.n_samples))
+        if self.trajectory.is_smooth:
+            return subdivided(rows, np.full(len(rows) - 1, _PARTS))
+        return rows[thinned(self.trajectory, np.zeros(0, dtype=np.int64)).rows]
+
+    def points(self, moments: FloatArray) -> FloatArray:
+        """The joints' centres at moments in waypoints, shape (n, N + 1, 3); [m]."""
+        rows = self.trajectory.at(moments)
+        return joint_centres(self.problem.manipulator, rows.x0, rows.alpha, rows.theta)
+
+    def parts(self, moments: FloatArray) -> list[Part]:
+        """The links with tool and feed, and what they carry, at moments."""
+        arm, rows = self.problem.manipulator, self.trajectory.at(moments)
+        centres, turns = self.points(moments), link_frames(rows.alpha, rows.theta)
+        colours = [*link_colours(arm.n_links), _DARK]
+        solids = [(one, colours[k]) for k, one in enumerate(arm.rods)]
+        solids += [(one, _DARK) for one in arm.carried]
+        still = np.broadcast_to(np.eye(3), (len(moments), 3, 3))
+        return [
+            Part(
+                solid.name,
+                surface(solid, 1.0, FINE),
+                colour,
+                centres[:, max(0, link - 1)],
+                turns[:, link - 1] if link else still,
+            )
+            for (link, solid), colour in solids
+        ]
 
 
 def _smooth(trajectory: Trajectory) -> dict[str, Any]:

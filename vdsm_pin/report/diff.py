@@ -1,10 +1,11 @@
 """What changed between two result folders: better, worse, newly refuted."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 from pydantic import ValidationError
 
@@ -12,9 +13,19 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, VerificationFile
 from vdsm_pin.report.tables import read_summary
-from vdsm_pin.report.words import TIME_LIMIT, outcome, quantity, term
+from vdsm_pin.report.words import (
+    TIME_LIMIT,
+    at_least,
+    mean_count,
+    outcome,
+    percent,
+    quantity,
+    term,
+)
 from vdsm_pin.text import printable
 from vdsm_pin.tolerances import TOLERANCES
+
+Text: TypeAlias = Callable[[float | None], str]
 
 _ORDER: Final = (
     "error",
@@ -25,7 +36,7 @@ _ORDER: Final = (
     "incomplete",
     "certified",
 )
-THRESHOLD: Final = "a change that the digits shown do not show is none"
+THRESHOLD: Final = "changes too small for the digits shown are left out"
 """Told with every comparison."""
 
 
@@ -44,13 +55,13 @@ class Change:
     worse: bool
 
 
-_MEASURES: Final = (
-    ("min_clearance_lower_m", "m", 1.0),
-    ("coverage", "share", 1.0),
-    ("max_joint_error_rad", "rad", 1.0),
-    ("changed_angles_mean_on_path", "-", -1.0),
+_MEASURES: Final[tuple[tuple[str, Text, float], ...]] = (
+    ("min_clearance_lower_m", at_least, 1.0),
+    ("coverage", percent, 1.0),
+    ("max_joint_error_rad", partial(quantity, unit="rad"), 1.0),
+    ("changed_angles_mean_on_path", mean_count, -1.0),
 )
-"""Numbers of a row, their units, and the sign of a change that is better."""
+"""Numbers of a row, how people read them, and the sign of a change that is better."""
 
 
 def compare_folders(old: Path, new: Path) -> tuple[Change, ...]:
@@ -103,12 +114,12 @@ def _compare(name: str, old: BatchRow, new: BatchRow) -> list[Change]:
 
 
 def _measured(
-    name: str, field: str, unit: str, better: float, old: BatchRow, new: BatchRow
+    name: str, field: str, text: Text, better: float, old: BatchRow, new: BatchRow
 ) -> Change | None:
     first, second = getattr(old, field), getattr(new, field)
     if first is None and second is None:
         return None
-    was, now = quantity(first, unit), quantity(second, unit)
+    was, now = text(first), text(second)
     what = f"{term(field)} {was} → {now}"
     if first is None or second is None:
         return Change(name, what, second is None)

@@ -9,7 +9,7 @@ from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.scene import Obstacle, solid_of
 from vdsm_pin.report.charts import packed
 from vdsm_pin.report.moves import moves
-from vdsm_pin.report.solids import Detail, detail, surface
+from vdsm_pin.report.solids import Detail, Surface, detail, surface
 from vdsm_pin.report.thinning import Thinned
 from vdsm_pin.verification.protocols import AnyMotion
 
@@ -20,16 +20,48 @@ class Silhouette(NamedTuple):
     Args:
         links: Points of each link, shape (n, 3): the ends of its axis, or its corners.
         radius: Of the links that are axes; 0 where they are corners.
-        path: The desired path, shape (m, 3).
     """
 
     links: list[FloatArray]
     radius: float
-    path: FloatArray
+
+
+class Part(NamedTuple):
+    """What moves as one, and where it is at some moments.
+
+    Args:
+        name: Of the link, or of what it carries.
+        skin: Its triangles, in its own frame.
+        colour: As #rrggbb.
+        places: Of its frame in the base frame, shape (n, 3); [m].
+        turns: R_base_part, shape (n, 3, 3); [-].
+    """
+
+    name: str
+    skin: Surface
+    colour: str
+    places: FloatArray
+    turns: FloatArray
 
 
 class Drawing(Protocol):
     """How the motion of an arm or robot is drawn."""
+
+    @property
+    def problem(self) -> AnyProblem:
+        """What is around it."""
+
+    @property
+    def trajectory(self) -> AnyMotion:
+        """The motion."""
+
+    @property
+    def extent(self) -> float:
+        """How far obstacles without an end are drawn; [m]."""
+
+    @property
+    def path(self) -> FloatArray:
+        """Corners of the desired path, shape (m, 3), none where none is asked; [m]."""
 
     @property
     def names(self) -> list[str]:
@@ -51,6 +83,15 @@ class Drawing(Protocol):
 
     def silhouette(self, moment: float) -> Silhouette:
         """The links at a moment in waypoints."""
+
+    def told_moments(self) -> FloatArray:
+        """Moments near enough that links go straight in between, shape (n,)."""
+
+    def points(self, moments: FloatArray) -> FloatArray:
+        """A point of every link at moments in waypoints, shape (n, k, 3); [m]."""
+
+    def parts(self, moments: FloatArray) -> list[Part]:
+        """The links and what they carry at moments in waypoints."""
 
 
 def obstacle_data(

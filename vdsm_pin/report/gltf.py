@@ -10,15 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, solid_of
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.moves import quaternion, told_moments
-from vdsm_pin.report.palette import OBSTACLE_EDGE, PATH, link_colours
-from vdsm_pin.report.solids import FINE, Surface, detail, surface
-from vdsm_pin.report.thinning import thinned
+from vdsm_pin.report.palette import OBSTACLE_EDGE, PATH
+from vdsm_pin.report.solids import Surface, detail, surface
 
 _BINARY: Final = 0x4E4F534A, 0x004E4942  # the chunks JSON and BIN
 _FLOATS, _NUMBERS = 5126, 5125
@@ -26,97 +23,71 @@ _POINTS, _INDICES = 34962, 34963
 _LINE: Final = 3
 _KINDS: Final = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 _Y_UP: Final = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
-_GLASS, _DARK = 0.42, "#3b4048"
+_GLASS: Final = 0.42
 
 
-def glb(problem: PlanningProblem, trajectory: Trajectory, seconds: float) -> bytes:
+def glb(drawing: Drawing, seconds: float) -> bytes:
     """The bytes of a .glb file.
 
     Args:
-        problem: Arm, scene and desired path.
-        trajectory: The motion; one row stands still.
+        drawing: Arm or robot, motion, scene and desired path.
         seconds: How long it plays where it has no times of its own; [s].
     """
-    file = _File()
-    rows = _drawn(problem, trajectory)
-    clock = file.times(play_times(problem, rows, seconds))
-    parts = [*_arm(file, problem, rows, clock), *_scene(file, problem, rows, clock)]
-    if problem.tip_path is not None:
-        parts.append(file.line("desired path", problem.tip_path.corners, PATH))
+    file, problem, moments = _File(), drawing.problem, _told(drawing)
+    clock = file.times(play_times(drawing, moments, seconds))
+    nodes = []
+    for part in drawing.parts(moments):
+        mesh = file.mesh(part.name, part.skin, part.colour)
+        nodes.append(file.node(name=part.name, mesh=mesh))
+        file.move(nodes[-1], clock, part.places, part.turns)
+    nodes += _scene(file, drawing, moments, clock)
+    if len(drawing.path):
+        nodes.append(file.line("desired path", drawing.path, PATH))
     matrix = problem.T_world_base.T.ravel().tolist()
-    base = file.node(name="base", matrix=matrix, children=parts)
+    base = file.node(name="base", matrix=matrix, children=nodes)
     root = file.node(name=problem.name, rotation=_Y_UP, children=[base])
     return file.packed(root)
 
 
-def play_times(
-    problem: PlanningProblem, rows: Trajectory, seconds: float
-) -> FloatArray:
-    """When each row is reached, from 0, shape (n_samples,); [s].
+def play_times(drawing: Drawing, moments: FloatArray, seconds: float) -> FloatArray:
+    """When each moment is reached, from 0, shape (n,); [s].
 
-    By its own times, else so that the joint centre that moves most moves evenly.
+    By the motion's own times, else so that the link that moves most moves evenly.
+
+    Args:
+        drawing: The motion.
+        moments: In waypoints, rising, shape (n,).
+        seconds: How long it plays where it has no times; [s].
     """
-    if rows.times is not None:
-        return np.asarray(rows.times - rows.times[0])
-    arm = problem.manipulator
-    centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
-    steps = np.linalg.norm(np.diff(centres, axis=0), axis=2).max(axis=1, initial=0.0)
+    times = drawing.trajectory.times_at(moments)
+    if times is not None:
+        return np.asarray(times - times[0])
+    ways = np.diff(drawing.points(moments), axis=0)
+    steps = np.linalg.norm(ways, axis=2).max(axis=1, initial=0.0)
     way = np.append(0.0, np.cumsum(steps + 1e-9))
     return np.asarray(seconds * way / max(way[-1], 1e-9))
 
 
-def _drawn(problem: PlanningProblem, trajectory: Trajectory) -> Trajectory:
-    """Rows near enough to each other that straight lines between them will do."""
-    rows = trajectory if trajectory.is_smooth else _fewer(trajectory)
-    rows = rows.refined(8)
-    told = [told_moments(one, rows) for one in problem.scene.moving]
-    if not told or rows.times is None:
-        return rows
-    return rows.at(np.unique(np.concatenate([np.arange(rows.n_samples), *told])))
-
-
-def _fewer(trajectory: Trajectory) -> Trajectory:
-    """The rows that a page shows."""
-    chosen = thinned(trajectory, np.zeros(0, dtype=np.int64)).rows
-    if len(chosen) == trajectory.n_samples:
-        return trajectory
-    return trajectory.at(chosen.astype(float))
-
-
-def _arm(
-    file: "_File", problem: PlanningProblem, rows: Trajectory, clock: int
-) -> list[int]:
-    """A node for each link with its tool, and for what the links carry."""
-    arm = problem.manipulator
-    centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
-    turns = link_frames(rows.alpha, rows.theta)
-    colours = [*link_colours(arm.n_links), _DARK]
-    parts = [(one, colours[k]) for k, one in enumerate(arm.rods)]
-    parts += [(one, _DARK) for one in arm.carried]
-    still = np.broadcast_to(np.eye(3), (rows.n_samples, 3, 3))
-    nodes = []
-    for (link, solid), colour in parts:
-        mesh = file.mesh(solid.name, surface(solid, 1.0, FINE), colour)
-        node = file.node(name=solid.name, mesh=mesh)
-        turn = turns[:, link - 1] if link else still
-        file.move(node, clock, centres[:, max(0, link - 1)], turn)
-        nodes.append(node)
-    return nodes
+def _told(drawing: Drawing) -> FloatArray:
+    """Moments near enough to each other that straight lines between them will do."""
+    motion, moving = drawing.trajectory, drawing.problem.scene.moving
+    told = [told_moments(one, motion) for one in moving if motion.times is not None]
+    return np.unique(np.concatenate([drawing.told_moments(), *told]))
 
 
 def _scene(
-    file: "_File", problem: PlanningProblem, rows: Trajectory, clock: int
+    file: "_File", drawing: Drawing, moments: FloatArray, clock: int
 ) -> list[int]:
     """A node for each obstacle; what moves is moved."""
-    obstacles, extent = problem.scene.obstacles, problem.manipulator.total_length
-    fine, nodes = detail(len(obstacles)), []
+    obstacles, nodes = drawing.problem.scene.obstacles, []
+    fine, times = detail(len(obstacles)), drawing.trajectory.times_at(moments)
     for one in obstacles:
-        skin = surface(solid_of(one), extent, fine)
+        skin = surface(solid_of(one), drawing.extent, fine)
         mesh = file.mesh(one.name, skin, OBSTACLE_EDGE, _GLASS)
         nodes.append(file.node(name=one.name, mesh=mesh))
         if isinstance(one, Moving):
-            own = one.carrier.path.own_times[:1].repeat(rows.n_samples)
-            poses = one.poses(own if rows.times is None else rows.times)
+            own = one.carrier.path.own_times[:1].repeat(len(moments))
+            poses = one.poses(own if times is None else times)
             file.move(nodes[-1], clock, poses[:, :3, 3], poses[:, :3, :3])
     return nodes
 

@@ -16,7 +16,7 @@ from markupsafe import Markup, escape
 from vdsm_pin import __version__, kept
 from vdsm_pin.errors import NoPlanFound, OutOfTime, VdsmError, VerificationFailed
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.files import BatchRow, PlanFile, VerificationFile
 from vdsm_pin.report.impasse import impasse_of
 from vdsm_pin.report.inputs import assumption
@@ -39,6 +39,7 @@ from vdsm_pin.report.words import (
     finite,
     limit,
     lost,
+    mean_count,
     measured,
     outcome,
     percent,
@@ -88,7 +89,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     filters = [quantity, depth, at_least, at_most, check_cells, limit, percent,
-               errors, outcome, measured, survived,
+               errors, outcome, mean_count, measured, survived,
                lost, counted, term, place, assumption, point, css_text,
                scene_words, sentence]  # fmt: skip
     environment.filters |= {one.__name__: one for one in filters}
@@ -182,17 +183,21 @@ def write_report(
     path.write_text(page, encoding="utf-8")
 
 
-def view_page(problem: PlanningProblem, trajectory: Trajectory, live: str = "") -> str:
+def view_page(drawing: Drawing, live: str = "") -> str:
     """The 3D view as one page.
 
     Args:
-        problem: Scene and arm.
-        trajectory: The motion to play.
+        drawing: The motion to play, in its scene.
         live: State of the files shown; with it the page asks its server for changes.
     """
-    data = view_data(problem, trajectory)
+    problem = drawing.problem
     return rendered(
-        "view.html.j2", problem=problem, data=data, live=live, most_drawn=MOST_DRAWN
+        "view.html.j2",
+        problem=problem,
+        arm=isinstance(problem, PlanningProblem),
+        data=view_data(drawing),
+        live=live,
+        most_drawn=MOST_DRAWN,
     )
 
 

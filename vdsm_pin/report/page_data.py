@@ -10,9 +10,9 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.charts import clearance_charts
+from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.drawings import drawing_of
 from vdsm_pin.report.impasse import Impasse
 from vdsm_pin.report.reason import failing
@@ -105,11 +105,10 @@ def report_data(verification: Verification) -> PageData:
     return PageData(text, tuple(plots), shown.complete, triangles)
 
 
-def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
+def view_data(drawing: Drawing) -> str:
     """The data of a 3D view; without a verification nothing is claimed."""
-    shown = thinned(trajectory, np.zeros(0, dtype=np.int64))
-    drawing = ArmDrawing(problem, trajectory)
-    scene = drawing.scene(problem.scene.obstacles[:MOST_DRAWN])
+    shown = thinned(drawing.trajectory, np.zeros(0, dtype=np.int64))
+    scene = drawing.scene(drawing.problem.scene.obstacles[:MOST_DRAWN])
     return embedded(_page(scene, drawing.motion(shown)))
 
 

@@ -31,8 +31,9 @@ def picture(verification: Verification) -> str:
     """The arm or robot at the moment of its smallest clearance, in its scene."""
     near = verification.approaches[:1]
     moment = near[0].moment if near else 0.0
-    shape = drawing_of(verification).silhouette(moment)
-    links, path = list(map(_view, shape.links)), _view(_thin(shape.path))
+    drawing = drawing_of(verification)
+    shape = drawing.silhouette(moment)
+    links, path = list(map(_view, shape.links)), _view(_thin(drawing.path))
     everything = np.vstack([*links, path])
     low, span = everything.min(axis=0), np.ptp(everything, axis=0)
     room = np.array([_WIDTH, _HEIGHT]) - 2.0 * _MARGIN

@@ -9,7 +9,14 @@ from vdsm_pin.io.tables import listed
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.rows import LeftOutRow
-from vdsm_pin.report.words import at_least, depth, finite, percent, place, quantity
+from vdsm_pin.report.words import (
+    at_least,
+    check_cells,
+    finite,
+    percent,
+    place,
+    quantity,
+)
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.inside import ARM_OUTSIDE, LINKS_OUTSIDE, surfaces
 from vdsm_pin.verification.records import (
@@ -56,14 +63,15 @@ def reason(verification: Verification) -> str:
     if not bad:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
-    found = f"{first.name} is {depth(first.worst, first.deeper, first.unit)}"
+    worst, asked = check_cells(first)
+    found = f"{first.name} is {worst}"
     inside = first.name in (ARM_OUTSIDE, LINKS_OUTSIDE)
     if inside:
         found = first.where
     elif math.isnan(first.worst):
         found = f'there is no evidence for "{first.name}"'
     elif not math.isnan(first.limit):
-        found += f" against a limit of {quantity(first.limit, first.unit)}"
+        found += f" against a limit of {asked}"
     where = "" if inside else first.where
     at = place(finite(first.moment), where, verification.time_at(first.moment))
     if at:

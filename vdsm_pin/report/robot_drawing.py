@@ -4,7 +4,8 @@ Links are drawn as they are judged: a mesh as its convex hull.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -15,11 +16,11 @@ from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.charts import packed, series
-from vdsm_pin.report.drawing import Silhouette, obstacle_data, row_data
+from vdsm_pin.report.drawing import Part, Silhouette, obstacle_data, row_data
 from vdsm_pin.report.moves import quaternion, subdivided
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import Surface, joined, piece_surface
-from vdsm_pin.report.thinning import Thinned
+from vdsm_pin.report.thinning import Thinned, thinned
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.units import MM_PER_M
 
@@ -37,42 +38,51 @@ _SMOOTH: Final = 8
 class RobotDrawing:
     """How the motion of a robot of a URDF is drawn."""
 
-    cell: Cell
-    path: Path
+    problem: Cell
+    trajectory: Path
+
+    @property
+    def extent(self) -> float:
+        """How far obstacles without an end are drawn; [m]."""
+        spans = [np.ptp(skin.vertices, axis=0).max() for skin in self._skins]
+        return 2.0 * float(max(spans))
+
+    @property
+    def path(self) -> FloatArray:
+        """No desired path, shape (0, 3)."""
+        return np.zeros((0, 3))
 
     @property
     def names(self) -> list[str]:
         """Names of the links, in the order of the brackets."""
-        return [body.name for body in self.cell.robot.bodies]
+        return [body.name for body in self.problem.robot.bodies]
 
     def scene(self, obstacles: Sequence[Obstacle]) -> dict[str, Any]:
         """Some obstacles and the links, each about the middle of its corners."""
-        bodies = self.cell.robot.bodies
-        skins, middles = [_skin(body) for body in bodies], _middles(bodies)
-        size = max(float(np.ptp(skin.vertices, axis=0).max()) for skin in skins)
+        bodies = self.problem.robot.bodies
         return {
-            **obstacle_data(self.cell, obstacles, self.path, 2.0 * size),
-            "radius": 0.1 * size,
+            **obstacle_data(self.problem, obstacles, self.trajectory, self.extent),
+            "radius": 0.05 * self.extent,
             "colours": list(link_colours(len(bodies))),
             "links": [
                 {
                     "name": body.name,
-                    "vertices": packed(skin.vertices - middle),
+                    "vertices": packed(skin.vertices),
                     "triangles": packed(skin.triangles, "<u4"),
                     "round": skin.round,
                 }
-                for body, skin, middle in zip(bodies, skins, middles, strict=True)
+                for body, skin in zip(bodies, self._skins, strict=True)
             ],
         }
 
     def motion(self, shown: Thinned) -> dict[str, Any]:
         """Where the links are at moments, near enough to go straight in between."""
-        moments = _moments(self.path, shown)
-        places, turns = self._stances(self.path.at_moments(moments))
+        moments = _moments(self.trajectory, shown)
+        places, turns = self._stances(self.trajectory.at_moments(moments))
         return {
-            **row_data(self.path, shown),
+            **row_data(self.trajectory, shown),
             "moments": packed(moments, "<f8"),
-            "links": len(self.cell.robot.bodies),
+            "links": len(self.problem.robot.bodies),
             "places": packed(places),
             "turns": packed(turns),
         }
@@ -84,31 +94,62 @@ class RobotDrawing:
 
     def _stances(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Middles and turns of the links at rows of q, (n_links, n_rows, 3 and 4)."""
-        robot = self.cell.robot
-        poses = robot.poses(q)
-        places, turns = [], []
-        for body, middle in zip(robot.bodies, _middles(robot.bodies), strict=True):
-            of_link = poses[:, body.frame]
-            places.append(of_link[:, :3, :3] @ middle + of_link[:, :3, 3])
-            turns.append([quaternion(pose[:3, :3]) for pose in of_link])
+        places, turns = self._frames(q)
+        return places, np.array([[quaternion(one) for one in each] for each in turns])
+
+    def _frames(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Middles and turns of the links at rows of q, (n_links, n_rows, ..)."""
+        robot = self.problem.robot
+        poses, bodies = robot.poses(q), zip(robot.bodies, self._middles, strict=True)
+        places = [
+            poses[:, body.frame, :3, :3] @ middle + poses[:, body.frame, :3, 3]
+            for body, middle in bodies
+        ]
+        turns = [poses[:, body.frame, :3, :3] for body in robot.bodies]
         return np.array(places), np.array(turns)
+
+    @cached_property
+    def _middles(self) -> list[FloatArray]:
+        """The middle of each link's corners, in its frame; [m]."""
+        return [_middle(body) for body in self.problem.robot.bodies]
+
+    @cached_property
+    def _skins(self) -> list[Surface]:
+        """Triangles to draw each link with, about its middle."""
+        skins = []
+        for body, middle in zip(self.problem.robot.bodies, self._middles, strict=True):
+            skin = joined([piece_surface(piece) for piece in body.pieces])
+            skins.append(replace(skin, vertices=skin.vertices - middle))
+        return skins
 
     def silhouette(self, moment: float) -> Silhouette:
         """Corners of each link at a moment in waypoints."""
-        robot = self.cell.robot
-        poses = robot.poses(self.path.at_moments(np.array([moment])))[0]
         links = [
-            _skin(body).vertices @ poses[body.frame][:3, :3].T
-            + poses[body.frame][:3, 3]
-            for body in robot.bodies
+            one.skin.vertices @ one.turns[0].T + one.places[0]
+            for one in self.parts(np.array([moment]))
         ]
-        return Silhouette(links, 0.0, np.zeros((0, 3)))
+        return Silhouette(links, 0.0)
+
+    def told_moments(self) -> FloatArray:
+        """Moments near enough that links go straight and turn evenly in between."""
+        return _moments(self.trajectory, thinned(self.trajectory, np.zeros(0, int)))
+
+    def points(self, moments: FloatArray) -> FloatArray:
+        """The links' middles at moments in waypoints, shape (n, n_links, 3); [m]."""
+        places, _ = self._frames(self.trajectory.at_moments(moments))
+        return places.swapaxes(0, 1)
+
+    def parts(self, moments: FloatArray) -> list[Part]:
+        """The links at moments in waypoints."""
+        looks = self.names, self._skins, link_colours(len(self.names))
+        rows = self._frames(self.trajectory.at_moments(moments))
+        return [Part(*one) for one in zip(*looks, *rows, strict=True)]
 
     def charts(
         self, shown: Thinned, clearances: list[dict[str, Any]]
     ) -> list[dict[str, Any]]:
         """The clearances, the joints that turn, and those that slide."""
-        joints, q = self.cell.robot.joints, self.path.knots[shown.rows]
+        joints, q = self.problem.robot.joints, self.trajectory.knots[shown.rows]
         colours, charts = link_colours(len(joints)), list(clearances)
         for turns, name, unit, factor in (
             (True, "Joint angles", "°", np.degrees(1.0)),
@@ -145,19 +186,11 @@ def _moments(path: Path, shown: Thinned) -> FloatArray:
     return subdivided(rows, parts)
 
 
-def _middles(bodies: Sequence[Body]) -> list[FloatArray]:
-    """The middle of each body's corners, in the frame of its link; [m]."""
-    found = []
-    for body in bodies:
-        corners = [
-            piece.points if isinstance(piece, Hull) else np.array([piece.centre])
-            for piece in body.pieces
-            if isinstance(piece, Hull | FlatCylinder)
-        ]
-        found.append(np.concatenate(corners).mean(axis=0))
-    return found
-
-
-def _skin(body: Body) -> Surface:
-    """Triangles to draw a body with, in the frame of its link."""
-    return joined([piece_surface(piece) for piece in body.pieces])
+def _middle(body: Body) -> FloatArray:
+    """The middle of a body's corners, in the frame of its link; [m]."""
+    corners = [
+        piece.points if isinstance(piece, Hull) else np.array([piece.centre])
+        for piece in body.pieces
+        if isinstance(piece, Hull | FlatCylinder)
+    ]
+    return np.asarray(np.concatenate(corners).mean(axis=0))

@@ -12,6 +12,7 @@ from vdsm_pin.report.words import (
     check_cells,
     errors,
     lost,
+    mean_count,
     measured,
     outcome,
     percent,
@@ -25,10 +26,9 @@ def show_plan(file: PlanFile, folder: Path) -> None:
     """One plan in a few lines."""
     motion = file.motion
     typer.echo(_headline(file, f"{file.problem}, planned by {file.strategy}"))
-    if not outcome(file.verdict).passed:
-        typer.echo(f"  {file.reason}")
+    typer.echo(f"  {printable(file.reason)}")
     changed = motion.changed_angles_mean_on_path
-    mean = "" if changed is None else f"{changed:.2f} on average on the path, "
+    mean = "" if changed is None else f"{mean_count(changed)} on average on the path, "
     ends = (measured(x0, "m") for x0 in (motion.x0_min_m, motion.x0_max_m))
     path: list[tuple[str, str]] = []
     waypoints = f"{motion.waypoints}"

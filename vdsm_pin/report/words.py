@@ -16,6 +16,7 @@ TIME_LIMIT: Final = "time-limit"
 
 if TYPE_CHECKING:
     from vdsm_pin.report.rows import CheckRow, ErrorBoxRow
+    from vdsm_pin.verification.records import Check
 
 Whole: TypeAlias = Callable[[float], int]
 """How a number is rounded to whole ones."""
@@ -169,11 +170,17 @@ def at_most(value: float | None, deeper: bool = False) -> str:
     return depth(value, deeper, "m", math.ceil)
 
 
-def check_cells(row: "CheckRow") -> tuple[str, str]:
-    """Worst value and limit of a check; a clearance that is proved is rounded down."""
-    proved = row.name.startswith(_CLEARANCE) and row.verdict != "refuted"
-    whole = math.floor if proved else None
-    asked = limit(row.limit, row.unit, whole)
+def check_cells(row: "CheckRow | Check") -> tuple[str, str]:
+    """Worst value and limit of a check.
+
+    A clearance is rounded to the safe side of what is proved of it: down, and up where
+    it is refuted by what it does not exceed.
+    """
+    refuted = row.verdict == "refuted"
+    whole: Whole | None = None
+    if row.name.startswith(_CLEARANCE):
+        whole = math.ceil if refuted else math.floor
+    asked = limit(row.limit, row.unit, None if refuted else whole)
     return depth(row.worst, row.deeper, row.unit, whole), asked
 
 
@@ -228,6 +235,11 @@ def errors(box: "ErrorBoxRow") -> str:
             f"of {one.name}"
         )
     return ", ".join(parts)
+
+
+def mean_count(value: float | None) -> str:
+    """How many things on average."""
+    return MISSING if value is None else f"{value:.2f}"
 
 
 def counted(count: int, word: str) -> str:

@@ -102,7 +102,8 @@ def _position_columns(
         if joint.name not in named:
             problem = (
                 f"has no column for joint {joint.name!r}, expected "
-                f"{joint.name}_{joint.unit}; or state its value with --lock"
+                f"{joint.name}_{joint.unit}; or state where it stands: `lock` in the "
+                "problem file, --lock beside --urdf"
             )
             raise InvalidFile(file=file, where="line 1", problem=problem)
         name, unit = named[joint.name]

@@ -149,7 +149,8 @@ def _first(row: Check, contact: FirstContact) -> Check:
     found = "first too close" if contact.clear_before else "first found too close"
     pair = f"{contact.pair.own} and {contact.pair.label}"
     moment = _told(contact.moment, contact.time)
-    where = f"{row.where}; {found} at waypoint {moment}: {pair}"
+    named = "" if row.where == pair else f": {pair}"
+    where = f"{row.where}; {found} at waypoint {moment}{named}"
     if contact.intervals:
         last = _told(contact.last, contact.last_time)
         runs = "" if contact.stretches == 1 else f" in {contact.stretches} stretches"
@@ -169,8 +170,8 @@ def _first(row: Check, contact: FirstContact) -> Check:
 
 def _told(moment: float, time: float) -> str:
     """A moment in waypoints, and its time where that is known."""
-    text = f"{moment:.6f}".rstrip("0").rstrip(".")
-    return text if isnan(time) else f"{text} ({time:.4f} s)"
+    text = f"{moment:.3f}".rstrip("0").rstrip(".")
+    return text if isnan(time) else f"{text} ({time:.3f} s)"
 
 
 def _refuted_by(row: Check, found: Counterexample, *, nominal: bool) -> Check:

@@ -286,7 +286,7 @@ def minimal(changed: IntArray, least: IntArray) -> list[str]:
     return [
         f"the number of changed link angles is proved minimal at {proved} of "
         f"{len(changed)} waypoints on the path: fewer, counting up to "
-        f"{np.rad2deg(TOLERANCES.changed_angle):.2g} deg as unchanged, would break a "
+        f"{np.rad2deg(TOLERANCES.changed_angle):.2g}° as unchanged, would break a "
         "limit or the clearance there"
     ]
 

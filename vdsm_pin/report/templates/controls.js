@@ -80,7 +80,7 @@ class Clearances {
       return { text: `${link.name} ${meets ? "meets" : "may meet"} ${known ? obstacle.name : "an obstacle"}`, short };
     }
     const from = known ? ` from ${obstacle.name}` : "";
-    return { text: `${link.name}${from}: at least ${lengthText(link.value / 1000, true)}`, short };
+    return { text: `${link.name}${from}: at least ${lengthText(link.value / 1000, Math.floor)}`, short };
   }
 }
 

@@ -8,9 +8,9 @@ const NARROW_GAP = 44; // pixels; below, the arrows of a dimension stand outside
 const FONT = '600 13px system-ui, "DejaVu Sans", sans-serif';
 const AXES = [["x", "#c92a2a"], ["y", "#2b8a3e"], ["z", "#1864ab"]];
 
-function lengthText(metres, proved = false) {
-  // What is proved is rounded down; a millionth of a digit is noise.
-  const mm = proved ? Math.floor(metres * 1e6 + 1e-6) / 1e3 : metres * 1000;
+// Rounded by `whole` to the safe side of what is proved; a millionth of a digit is noise.
+function lengthText(metres, whole = Math.round) {
+  const mm = whole(Math.round(metres * 1e12) / 1e6) / 1e3;
   const size = Math.abs(mm);
   const digits = size >= 1000 ? 1 : size >= 1e-3 || size === 0 ? 3 : -1;
   const text = digits < 0 ? mm.toExponential(1) : mm.toFixed(digits);
@@ -153,7 +153,7 @@ class Overlay {
       const tick = [-8 * way[1], 8 * way[0]];
       this.line(colour, 2, [p[0] - tick[0], p[1] - tick[1]], [p[0] + tick[0], p[1] + tick[1]]);
     }
-    const words = lengthText(upper) + (deeper ? " or deeper" : "") + (nominal ? " without errors" : "");
+    const words = lengthText(upper, Math.ceil) + (deeper ? " or deeper" : "") + (nominal ? " without errors" : "");
     const middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
     const aside = along[0] >= 0 ? [along[1], -along[0]] : [-along[1], along[0]];
     this.pen.font = FONT;
