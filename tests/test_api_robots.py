@@ -187,7 +187,7 @@ def test_what_is_of_no_robot_is_refused_in_a_sentence(
 
 def test_a_cell_shows_itself_in_a_few_lines(cell: vp.Cell) -> None:
     result = vp.verify(cell, SWEEP)
-    for value in (cell, result):
+    for value in (cell, result, SWEEP):
         assert len(repr(value).splitlines()) < 12
         assert value._repr_html_().startswith("<table>")
     assert "turn" in repr(cell)

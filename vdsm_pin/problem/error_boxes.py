@@ -83,15 +83,17 @@ class ErrorBox:
         for field in ("joints", "obstacles", "named"):
             object.__setattr__(self, field, tuple(getattr(self, field)))
         check_numbers(self, *PLAIN)
-        values = [("joint", e) for pair in self.joints for e in pair]
-        values += [("obstacle", e) for o in self.obstacles for e in (o.shift, o.turn)]
-        values += [(repr(j.name), e) for j in self.named for e in (j.turn, j.shift)]
-        values += [(name, getattr(self, name)) for name in PLAIN]
-        for name, value in values:
+        values = [("joint", e, "rad") for pair in self.joints for e in pair]
+        for o in self.obstacles:
+            values += [("obstacle", o.shift, "m"), ("obstacle", o.turn, "rad")]
+        for j in self.named:
+            values += [(repr(j.name), j.shift, "m"), (repr(j.name), j.turn, "rad")]
+        values += [(name, getattr(self, name), unit) for name, unit in PLAIN.items()]
+        for name, value, unit in values:
             if not (isinstance(value, Real) and 0.0 <= value < np.inf):
-                message = (
-                    f"{name.replace('_', ' ')} error is {value}, expected 0 or more"
-                )
+                found = f"{value:.6g} {unit}" if isinstance(value, Real) else value
+                what = f"{name.replace('_', ' ')} error is {found}"
+                message = f"{what}, expected 0 or more"
                 raise InvalidInput(message)
 
     def __eq__(self, other: object) -> bool:
@@ -161,8 +163,10 @@ class ErrorBox:
         )
 
 
-PLAIN = ("joint", "base", "obstacle", "base_turn", "slide")
-"""The errors that are one number."""
+PLAIN: Final[Mapping[str, str]] = MappingProxyType(
+    {"joint": "rad", "base": "m", "obstacle": "m", "base_turn": "rad", "slide": "m"}
+)
+"""The errors that are one number, with their units."""
 
 
 class TypedErrorBox(ErrorBox):

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze
+from vdsm_pin.notebook import Summarised
 
 if TYPE_CHECKING:
     from vdsm_pin.proof.paths import Path
 
 
-@dataclass(frozen=True, eq=False)
-class JointTrajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointTrajectory(Summarised):
     """Waypoints of named joints.
 
     Straight lines join them; cubic pieces where there are times and rates, and quintic
@@ -96,6 +97,16 @@ class JointTrajectory:
         from vdsm_pin.proof.paths import Path
 
         return Path.through(self.q, self.times, self.rates, self.changes)
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Its joints, its size and its time."""
+        times = self.times
+        known = "none" if times is None else f"{times[0]:g} s to {times[-1]:g} s"
+        return (
+            ("joints", ", ".join(self.names)),
+            ("waypoints", str(len(self.q))),
+            ("times", known),
+        )
 
     def of(self, names: Sequence[str]) -> "JointTrajectory":
         """The columns of some of its joints, in their order."""

@@ -187,7 +187,7 @@ class Trajectory(Summarised):
             ("links", str(self.n_links)),
             ("waypoints", f"{self.n_samples}, {int(self.on_path.sum())} on the path"),
             ("x0", f"{in_mm(low)} to {in_mm(high)}"),
-            ("largest angle", f"{largest:.3f} deg"),
+            ("largest angle", f"{largest:.3f}°"),
         )
 
     @property

@@ -105,7 +105,7 @@ def route_step(moment: Moment) -> Part:
     words = [
         f"The path is joined {SCHEMES[problem.path.approach]} "
         f"(approach: {problem.path.approach.value}).",
-        f"At waypoint {moment.row} of {len(tips.points)} the tip {state}.",
+        f"At waypoint {moment.row} of {len(tips.points) - 1} the tip {state}.",
     ]
     side = int(route.side[moment.row])
     if side:
