@@ -196,6 +196,24 @@ def test_a_path_into_an_obstacle_is_refused_or_drawn_up_to_it() -> None:
     assert 1.0 - result.coverage == pytest.approx(lost / 6.0, abs=0.021 / 6.0)
 
 
+def test_a_corner_that_no_tip_comes_to_is_refused_at_once_and_proves_nothing() -> None:
+    """A motion may cut it between two waypoints; too near by 0.1 mm at one row."""
+    corner = np.array([3.126, 0.3, 0.3])
+    points = np.array([[3.126, 0.3, 0.0], corner, [3.126, 0.0, 0.3]])
+    off = (0.1 + 0.0615 + 0.0035 - 1e-4) * np.array([0.0, 1.0, 1.0]) / np.sqrt(2.0)
+    ball = Sphere("ball", corner + off, 0.1)
+    task = problem(ball, points=points, closed=False, blocked=Blocked.FAIL)
+    clearance, asked = link_clearance(task), []
+
+    def counted(centres: FloatArray, axes: Axes = None, /) -> FloatArray:
+        asked.append(len(centres))
+        return clearance(centres, axes)
+
+    with pytest.raises(NoPlanFound, match=r"'ball' blocks .* have a waypoint there"):
+        plan_fewest(task, counted, 0.0)
+    assert len(asked) == 2  # the start, and the tips
+
+
 def test_a_path_behind_a_wall_is_not_found_and_says_what_stands_in_the_way() -> None:
     wall = HalfSpace("wall", np.array([0.0, 0.4, 0.0]), np.array([0.0, -1.0, 0.0]))
     task = problem(wall, blocked=Blocked.FAIL)

@@ -53,9 +53,12 @@ from vdsm_pin.units import in_mm
 def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
     """Raise where it is proved that nothing of the path can be drawn.
 
-    Where the problem allows no detour, something that cannot be drawn is enough.
+    Where the problem allows no detour, something that cannot be drawn is enough. A
+    single row is no proof: the tip may pass it between two waypoints. But no plan is
+    looked for that has no waypoint there.
 
     Raises:
+        NoPlanFound: Where there is no waypoint at a single row.
         OutOfReach: Beyond the reach of the curled arm.
         PathBlocked: Too much of the path lies within an obstacle's margin.
         HemmedIn: The last link has no room at too much of the path.
@@ -68,6 +71,9 @@ def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
     whole = problem.path.blocked is Blocked.FAIL
     if proof.closed.all() or (whole and shut > 0.0):
         raise _proved(problem, outcome)
+    if whole and proof.closed.any():
+        message = f"{_proved(problem, outcome)}; plans have a waypoint there"
+        raise NoPlanFound(message)
 
 
 def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
