@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from some_slow import few_of
 
+from benchmarks.hrm2000.passages import Hook
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidFile, NoPlanFound, UnknownName
@@ -97,6 +98,19 @@ def test_joint_values_are_come_to_from_straight_and_back(
     out = planned(to(posture(zero), *wall(0.12), start=goal)).plan.trajectory
     np.testing.assert_allclose(out.joints[0], goal.joints, atol=1e-9)
     np.testing.assert_allclose(out.joints[-1], zero, atol=1e-9)
+
+
+def test_joint_values_behind_a_core_are_come_to_as_their_own_curve_leads() -> None:
+    """All joints bent by 105 deg in sum, and little room; again the same plan."""
+    made = Hook(105.0)(np.random.default_rng(3), ARM)
+    motion, centres = made.witness.motion, made.witness.centres
+    start, goal = Posture(centres[0, -1]), Posture(centres[-1, -1], motion.joints[-1])
+    told, again = (
+        planned(to(goal, *made.obstacles, start=start)).plan.trajectory
+        for _ in range(2)
+    )
+    np.testing.assert_allclose(told.joints[-1], motion.joints[-1], atol=1e-9)
+    np.testing.assert_array_equal(told.joints, again.joints)
 
 
 def test_a_goal_in_an_obstacle_is_refused_and_says_from_which_end() -> None:

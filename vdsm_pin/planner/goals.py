@@ -3,7 +3,8 @@
 A goal for the tip is a path of one point. Joint values as a goal are planned towards
 from both ends: a straight line in joint space where that is clear; else from the goal
 to where the tip starts, run backwards, with such a line to or from the start; else from
-the start to the goal's tip with such a line at its end.
+the start to the goal's tip with such a line at its end. Where the arm is confined it
+draws back along its own curve and goes in along that of the other end.
 """
 
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_centres, straight_joints
 from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.fewest.follow_the_leader import way_back
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.strategies import Strategy
@@ -33,11 +35,28 @@ def with_path(problem: PlanningProblem) -> PlanningProblem:
     return _from(problem, problem.start, problem.goal.tip)
 
 
-def _from(problem: PlanningProblem, start: Posture, tip: FloatArray) -> PlanningProblem:
-    """The problem to bring the tip from a start to a place."""
+def _from(
+    problem: PlanningProblem,
+    start: Posture,
+    tip: FloatArray,
+    end: Posture | None = None,
+) -> PlanningProblem:
+    """The problem to bring the tip from a start to a place.
+
+    Args:
+        problem: Arm and scene.
+        start: Where the arm stands.
+        tip: Where the tip shall be, shape (3,); [m].
+        end: With joints: how the arm shall stand there at best. It is followed in.
+    """
     path = DesiredPath(
         start.tip, tip[None], blocked=Blocked.FAIL, start_joints=start.joints
     )
+    if end is not None and end.joints is not None:
+        q = end.joints[None]
+        arm = problem.manipulator
+        centres = joint_centres(arm, q[:, 0], q[:, 1::2], q[:, 2::2])[0]
+        path = replace(path, insertion=way_back(centres)[::-1])
     return replace(problem, tip_path=path, start=None, goal=None)
 
 
@@ -123,9 +142,11 @@ def _to_joints(
     if start is None:
         start = straight_joints(known.manipulator, path.start)
     need = known.required_clearance + float(np.max(margin, initial=0.0))
-    back = _from(known, goal, path.start)
+    begin = Posture(path.start, start)
+    back = _from(known, goal, begin.tip, begin)
+    there = _from(known, begin, goal.tip, goal)
     reasons = []
-    for asked, end, turned in ((back, start, True), (known, goal.joints, False)):
+    for asked, end, turned in ((back, start, True), (there, goal.joints, False)):
         try:
             plan = plan_with(asked, clearance, margin)
         except Infeasible as error:

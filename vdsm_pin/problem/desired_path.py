@@ -63,7 +63,7 @@ class DesiredPath:
         pointing: Where the last link shall look meanwhile; None for anywhere.
         home: Whether the arm shall go back to its start by the way it came.
         insertion: Places between start and path that `follow-the-leader` takes, in this
-            order, shape (k, 3); [m].
+            order, and others try, shape (k, 3); [m].
 
     Raises:
         InvalidInput: If a value breaks its range, or directions do not fit the corners.

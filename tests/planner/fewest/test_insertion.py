@@ -24,7 +24,12 @@ from vdsm_pin.planner.fewest import elastic_band
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.elastic_band import resampled
-from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
+from vdsm_pin.planner.fewest.follow_the_leader import (
+    followed,
+    led_along,
+    own_curve,
+    way_back,
+)
 from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.judge import Judge
@@ -359,6 +364,26 @@ def test_an_arm_led_along_a_curve_lies_on_it() -> None:
     later = led_along(route[300:], laid[300], ARM.link_lengths)[:, -3:-1]
     off = np.linalg.norm(later - [lead, radius, 0.0], axis=2) - radius
     assert np.abs(off).max() < 0.0086 / 64
+
+
+def test_an_arm_that_draws_back_lies_where_it_lay() -> None:
+    """Back as it came; one that starts bent along its own curve, until straight."""
+    rng = np.random.default_rng(3)
+    turn = np.linspace(0.0, 1.0, 60)
+    arc = np.stack([np.sin(turn), 0.0 * turn, 1.0 - np.cos(turn)], axis=1) * 1.3
+    start = np.zeros((ARM.n_links + 1, 3))
+    start[:, 0] = ARM.stations - ARM.total_length
+    there = led_along(arc, start, ARM.link_lengths)
+    both = led_along(np.vstack([arc, arc[-2::-1]]), start, ARM.link_lengths)
+    np.testing.assert_allclose(both[60:], there[-2::-1], rtol=0, atol=1e-12)
+    for bent in [there[-1], *bent_arms(rng, 5)]:
+        tips = way_back(bent)
+        laid = led_along(tips, bent, ARM.link_lengths)
+        np.testing.assert_array_equal(tips[0], bent[-1])
+        assert np.abs(laid[-1, :, 1:]).max() < 1e-9
+        curve = np.vstack([bent[-1:], own_curve(bent)])
+        assert off_curve(laid[:, 1:].reshape(-1, 3), curve) < 1e-9
+    np.testing.assert_array_equal(way_back(start), start[-1:])
 
 
 def test_a_leader_is_followed_through_a_tube_where_chance_is_lost() -> None:

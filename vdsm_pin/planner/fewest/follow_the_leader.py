@@ -6,6 +6,7 @@ import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.tolerances import TOLERANCES
 
 PARTS: Final = 8
 """Pieces of the curve between two joints."""
@@ -109,14 +110,18 @@ def followed(centres: FloatArray, tips: FloatArray, lengths: FloatArray) -> Floa
 def _laid_along(route: FloatArray, own: FloatArray, lengths: FloatArray) -> FloatArray:
     """As `led_along` has it; `own` is what `own_curve` returns for the start."""
     count, points = lengths.size, route.shape[0]
+    # Corners from the tip on; ahead of them there is room for those of the route.
     curve = np.zeros((points + own.shape[0], 3))
-    for k in range(points):
-        curve[k] = route[points - 1 - k]
     curve[points:] = own
-    result = np.zeros((points, count + 1, 3))
+    at, result = points, np.zeros((points, count + 1, 3))
     for k in range(points):
+        if at + 1 < curve.shape[0] and (route[k] == curve[at + 1]).all():
+            at += 1
+        else:
+            at -= 1
+            curve[at] = route[k]
         result[k, count] = route[k]
-        _lay(curve, points - k, lengths, result[k])
+        _lay(curve, at + 1, lengths, result[k])
     return result
 
 
@@ -154,8 +159,25 @@ def own_curve(centres: FloatArray) -> FloatArray:
     return np.concatenate([curve.reshape(-1, 3), far])
 
 
+def way_back(start: FloatArray) -> FloatArray:
+    """Tips of an arm that draws back along what it lies on until it is straight.
+
+    Args:
+        start: Joint centres, shape (N + 1, 3); [m].
+
+    Returns:
+        Corners of its own curve, its tip first, shape (k, 3), k = 1 if it is straight.
+    """
+    curve = np.concatenate([start[-1:], own_curve(start)[:-1]])
+    bent = np.flatnonzero(np.abs(curve[:, 1:]).max(axis=1) > TOLERANCES.joint_centre)
+    return curve[: bent[-1] + 2] if bent.size else curve[:1]
+
+
 def led_along(route: FloatArray, start: FloatArray, lengths: FloatArray) -> FloatArray:
     """The arm at every point of its tip's route, laid on what the tip has run along.
+
+    Where the next point is the corner before, the arm draws back: what lay ahead of it
+    is forgotten.
 
     Args:
         route: Of the tip, shape (k, 3); [m].

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.planner.fewest.follow_the_leader import way_back
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
@@ -22,6 +23,8 @@ from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.start_node import checked_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
+from vdsm_pin.planner.spacing import stepped
+from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -116,6 +119,8 @@ class _Search:
         self.route, self.effort = route, effort
         self.tips = route.tips[route.layers]
         self.root = checked_start(judge, route.tips[:1], effort.directed)
+        self.back = way_back(start_centres(judge.problem))
+        self.outside = space.begun_at(self.back[-1])
         self.rng = np.random.default_rng(effort.seed)
         self.farthest: _Visit | None = None
 
@@ -206,12 +211,23 @@ class _Search:
         return path.aims(tips, stations), weight
 
     def _routes(self, path: FloatArray) -> Iterator[FloatArray]:
-        """Ways of the tip to a path's first point, also by way of points after it.
+        """Ways of the tip to a path's first point, first the one that is stated.
 
-        Who comes from there arrives in a posture that goes on to there.
+        Then by way of points after it: who comes from there arrives in a posture that
+        goes on to there. An arm that starts bent also draws back until it is straight,
+        and goes in from there.
         """
+        stated = self.judge.problem.path.insertion
+        if len(stated) and (path[0] == self.tips[0]).all():
+            way = np.vstack([self.back[-1:], stated, path[:1]])
+            way = way[np.append(True, (np.diff(way, axis=0) != 0.0).any(axis=1))]
+            points, _ = stepped(way, self.space.spacing)
+            yield np.vstack([self.back, points[1:]])
         yield from self.space.routes(path[0], self.effort.routes)
         yield from self.space.swing(path[0])
+        if len(self.back) > 1:
+            for route in self.outside.routes(path[0], 1):
+                yield np.vstack([self.back, route[1:]])
         for ahead in AHEAD:
             if ahead < len(path):
                 for route in self.space.routes(path[ahead], 1):

@@ -7,6 +7,7 @@ is proved here.
 """
 
 from collections.abc import Iterator
+from copy import copy
 from itertools import islice
 
 import numpy as np
@@ -53,6 +54,13 @@ class TipSpace:
         self.known: dict[bytes, list[FloatArray]] = {}
         self.searches: dict[bytes, Iterator[FloatArray]] = {}
         self.begun: dict[bytes, tuple[TipCells, FloatArray | None]] = {}
+
+    def begun_at(self, start: FloatArray) -> "TipSpace":
+        """The same from another start, shape (3,); what is avoided is so in both."""
+        other = copy(self)
+        other.start = start
+        other.known, other.searches, other.begun = {}, {}, {}
+        return other
 
     def routes(self, goal: FloatArray, most: int) -> Iterator[FloatArray]:
         """Ways of the tip from the start to a goal, the best first.
