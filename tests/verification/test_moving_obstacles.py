@@ -110,7 +110,7 @@ def test_a_ball_meets_a_capsule_when_the_closed_form_says(tmp_path: Path) -> Non
     row = next(c for c in found.checks if c.name == "clearance from obstacles")
     assert row.first_moment == pytest.approx((1.0 + 1.1) / 4.0, abs=2e-6)
     assert "ball" in row.where
-    assert f"({1.0 + 1.1:.4f} s)" in row.where
+    assert f"({1.0 + 1.1:.3f} s)" in row.where
 
 
 @pytest.mark.parametrize("off, verdict", [(0.1, "certified"), (-0.1, "refuted")])

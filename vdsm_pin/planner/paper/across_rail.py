@@ -105,7 +105,19 @@ class AcrossRail:
         Raises:
             PathBlocked: If they cannot lead the arm round the obstacle.
         """
-        planar, tip_x = reference.copy(), route.tip_path.points[:, 0]
+        return self.bent(reference, route.tip_path.points[:, 0])
+
+    def bent(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
+        """Projections of arms whose bends have moved, shape (n, N + 1, 2); [m].
+
+        Args:
+            reference: Projections of the joints without obstacle, the same shape; [m].
+            tip_x: Tip positions along the rail, shape (n,); [m].
+
+        Raises:
+            PathBlocked: If the bends cannot lead the arm round the obstacle.
+        """
+        planar = reference.copy()
         blocked = np.flatnonzero(~self.clear(reference, tip_x))
         if len(blocked):
             move = self._least_move(reference[blocked], tip_x[blocked])
