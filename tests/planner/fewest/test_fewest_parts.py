@@ -307,6 +307,7 @@ def test_a_closed_path_may_be_begun_at_any_of_its_rows(
     for first in range(0, len(rows.tips) - 1, 17):
         other = rows.begun_at(first, path.length)
         np.testing.assert_array_equal(other.tips[[0, -1]], rows.tips[[first, first]])
+        np.testing.assert_allclose(other.tips[other.as_stated], rows.tips, atol=1e-12)
         assert 0.0 <= other.stations[0] < path.length
         span = other.stations[-1] - other.stations[0]
         assert span == pytest.approx(path.length, abs=1e-12)

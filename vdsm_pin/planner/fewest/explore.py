@@ -38,7 +38,7 @@ from vdsm_pin.planner.fewest.start_node import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips
-from vdsm_pin.planner.impossible.cut_off import cut_off
+from vdsm_pin.planner.impossible.cut_off import FEW_CELLS, MOST_CELLS, cut_off
 from vdsm_pin.planner.impossible.last_link import hemmed_in
 from vdsm_pin.planner.upper_clearance import TIP_ONLY, held_from, last_link
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -174,15 +174,10 @@ def explore(
             # Seldom needed, so only now: can it be done at all?
             prove = proofs.pop(0)
             inserts = [one for one in (level, *levels) if isinstance(one, Insert)]
-            if (
-                prove is _cut_off
-                and inserts
-                and _leads_there(spaces.of(inserts[0]), best)
-            ):
-                continue
-            proof = prove(problem, clearance, best)
-            best = replace(best, proof=proof)
+            space = spaces.of(inserts[0]) if inserts and prove is _cut_off else None
+            best = prove(problem, clearance, best, space)
             yield best
+            proof = best.proof.take(best.rows.as_stated)
             if proof.closed.all():
                 return
     if best.found is None and inserted is None and stuck is not None:
@@ -273,24 +268,38 @@ def _once_inserted(
 
 
 def _cut_off(
-    problem: PlanningProblem, clearance: BroadPhase, outcome: Outcome
-) -> TipProof:
-    """What is proved, with rows that no way of the tip leads to."""
+    problem: PlanningProblem,
+    clearance: BroadPhase,
+    outcome: Outcome,
+    space: TipSpace | None,
+) -> Outcome:
+    """The outcome with rows that no way of the tip is proved to lead to.
+
+    A long look is worth it only where no way of the tip is known.
+    """
     there, tips = held_from(problem, TIP_ONLY), outcome.rows.tips
-    return replace(outcome.proof, cut_off=cut_off(there, tips, clearance.deadline))
+    for most in (FEW_CELLS, MOST_CELLS):
+        found = cut_off(there, tips, clearance.deadline, most)
+        outcome = replace(outcome, proof=replace(outcome.proof, cut_off=found))
+        if outcome.proof.closed.all() or (space and _leads_there(space, outcome)):
+            break
+    return outcome
 
 
 def _hemmed_in(
-    problem: PlanningProblem, clearance: BroadPhase, outcome: Outcome
-) -> TipProof:
-    """What is proved, with rows not drawn where the last link has no room."""
+    problem: PlanningProblem,
+    clearance: BroadPhase,
+    outcome: Outcome,
+    _: TipSpace | None,
+) -> Outcome:
+    """The outcome with rows not drawn where the last link is proved to have no room."""
     tips, proof = outcome.rows.tips, outcome.proof
     open_ = np.flatnonzero(~(outcome.drawn | proof.closed))
     hemmed = np.zeros(len(tips), dtype=np.bool_)
     enough = clearance.up_to(problem.required_clearance)
     there = held_from(problem, last_link(problem))
     hemmed[open_] = hemmed_in(there, enough, tips[open_])
-    return replace(proof, hemmed_in=hemmed)
+    return replace(outcome, proof=replace(proof, hemmed_in=hemmed))
 
 
 def _look(

@@ -20,11 +20,21 @@ class PathRows:
             length, shape (r,); [m].
         tips: Where the rows are, shape (r, 3); [m].
         corner: Whether a row is a corner, the first or the last, shape (r,).
+        first: Number of the first one on a closed path that is begun elsewhere.
     """
 
     stations: FloatArray
     tips: FloatArray
     corner: BoolArray
+    first: int = 0
+
+    @property
+    def as_stated(self) -> IntArray:
+        """Numbers of these rows in the order of the path as stated, shape (r,)."""
+        count = len(self.stations)
+        if self.first == 0:
+            return np.arange(count)
+        return rolled(count, count - 1 - self.first)
 
     def begun_at(self, first: int, length: float) -> "PathRows":
         """A closed path of this length [m] begun at another of its rows."""
@@ -35,7 +45,7 @@ class PathRows:
             stations -= length
         corner = self.corner[order]
         corner[[0, -1]] = True
-        return PathRows(stations, self.tips[order], corner)
+        return PathRows(stations, self.tips[order], corner, first)
 
 
 @dataclass(frozen=True)
