@@ -86,6 +86,17 @@ def test_a_robot_is_shown_with_its_motion_or_where_it_begins(tmp_path: Path) -> 
     assert 'data-look="tip"' not in page
 
 
+def test_a_robot_whose_joints_all_stand_is_shown(tmp_path: Path) -> None:
+    new_project(tmp_path / "cell", "robot")
+    urdf = tmp_path / "cell" / "robot.urdf"
+    text = re.sub(
+        r'type="(revolute|prismatic|continuous)"', 'type="fixed"', urdf.read_text()
+    )
+    urdf.write_text(text, encoding="utf-8")
+    shown = drawing(read_problem_or_cell(tmp_path / "cell" / "problem.yaml"), None)
+    assert shown.trajectory.knots.shape == (1, 0)  # type: ignore[attr-defined]
+
+
 def test_a_changed_file_is_noticed_and_a_broken_one_explained(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     write_trajectory(path, made_up.trajectory(4))

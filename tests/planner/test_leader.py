@@ -9,6 +9,8 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.planner.fewest.follow_the_leader import led_along
+from vdsm_pin.planner.spacing import stepped
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -53,6 +55,18 @@ def test_joints_lie_on_the_tips_curve_and_the_motion_is_certified() -> None:
     assert from_line(joints, curve).max() < 1e-9
     again = plan_and_verify(problem, NAME).plan
     np.testing.assert_array_equal(again.centres, found.plan.centres)
+
+
+def test_a_way_that_is_gone_back_is_left_along_the_same_curve() -> None:
+    """Both ways are cut into rows by themselves, which differ in their last digits."""
+    way = np.vstack([[-0.3, 0.0, 0.0], arc(1.2, 50.0)])
+    points, _ = stepped(np.vstack([way, way[-2::-1]]), 0.01)
+    half, start = len(points) // 2, np.zeros((ARM.n_links + 1, 3))
+    start[:, 0] = points[0, 0] - ARM.total_length
+    start[1:, 0] += np.cumsum(ARM.link_lengths)
+    arms = led_along(points, start, ARM.link_lengths)
+    assert (points[:half] != points[:half:-1]).any()
+    np.testing.assert_allclose(arms[:half], arms[:half:-1], atol=1e-9)
 
 
 def test_a_corner_too_sharp_names_the_joint_and_the_tip() -> None:

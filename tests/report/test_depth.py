@@ -15,6 +15,7 @@ from vdsm_pin.report.facts import min_clearance, verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.reason import reason
 from vdsm_pin.report.run_record import RunRecord
+from vdsm_pin.report.words import check_cells
 from vdsm_pin.verification.records import Verification
 from vdsm_pin.verification.verify import verify
 
@@ -49,3 +50,13 @@ def test_a_depth_beyond_the_radius_is_called_that_or_deeper(
     deepest = f"−{told:.3f} mm or deeper"
     for text in (reason(found), page):
         assert (deepest in text) == (gap < 0.0)
+
+
+def test_a_refuted_clearance_never_reads_as_its_limit() -> None:
+    found = beside_a_box(0.03)
+    row = next(one for one in found.checks if one.name == "clearance from obstacles")
+    for worst in (0.0049990001, 0.0049996, 0.0049999999):
+        told = check_cells(replace(row, worst=worst, limit=0.005, deeper=False))
+        assert told == ("4.999 mm", "5.000 mm")
+    told = check_cells(replace(row, worst=0.0049984, limit=0.005, deeper=False))
+    assert told == ("4.999 mm", "5.000 mm")

@@ -1,5 +1,7 @@
 """What a robot is read as: groups, bases, limits, covers; Pinocchio agrees."""
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -344,6 +346,19 @@ def test_xacro_is_expanded(tmp_path: Path) -> None:
     for bad in (text.replace("0.05 *", "length *"), text[:300], large):
         with pytest.raises(InvalidFile, match="is not expanded by xacrodoc"):
             read_robot(RobotFiles(write(tmp_path, "two.urdf.xacro", bad)))
+
+
+def test_xacro_is_expanded_where_memory_is_limited_already(tmp_path: Path) -> None:
+    pytest.importorskip("xacrodoc")
+    file = write(tmp_path, "two.urdf.xacro", URDF)
+    asked = "import sys, pathlib; from vdsm_pin.robots.xacro import urdf_text; "
+    asked += "print(len(urdf_text(pathlib.Path(sys.argv[1]), ())[0]))"
+    script = f"ulimit -v 8000000; exec '{sys.executable}' -c '{asked}' '{file}'"
+    done = subprocess.run(
+        ["bash", "-c", script], check=False, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 100
 
 
 def test_what_a_xacro_includes_is_in_its_hash(tmp_path: Path) -> None:

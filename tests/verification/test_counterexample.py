@@ -271,6 +271,7 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
     given = replace(proof, asked=held, path=path, inner=least, counts=counts)
     found = given.with_meetings()
     wanted, rest = [upper.copy(), points.copy()], counts.copy()
+    moments = numbers + shares
     expected, met = list[tuple[int, float]](), 0
     for k in range(n):
         near = upper[k] <= MEETING
@@ -285,13 +286,17 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
             expected.append((k, moment))
             if radius > max(0.0, -upper[k]):
                 wanted[0][k], wanted[1][:, k] = -radius, middle + moment
+                moments[k] = moment
                 rest[k, REFUTED] += 1
                 rest[k, UNDECIDED] -= 1
                 break
     assert [k for k, _ in asked] == [k for k, _ in expected]
     np.testing.assert_allclose([at for _, at in asked], [at for _, at in expected])
     np.testing.assert_array_equal(found.counts, rest)
+    np.testing.assert_array_equal(found.inner.verdict, verdicts_of(rest))
+    np.testing.assert_array_equal(found.inner.lower, lower)
     np.testing.assert_array_equal(found.inner.upper, wanted[0])
+    np.testing.assert_allclose(found.inner.interval + found.inner.share, moments)
     np.testing.assert_allclose(found.inner.link_point, wanted[1][0])
     np.testing.assert_allclose(found.inner.other_point, wanted[1][1])
     assert 0 < met and (rest != counts).any()

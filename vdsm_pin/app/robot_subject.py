@@ -57,9 +57,8 @@ class RobotSubject:
     def at_start(self) -> JointTrajectory:
         """The motion that stays with every joint at 0, or at its limit nearest to 0."""
         joints = self.problem.robot.joints
-        low, high = np.array([(joint.lower, joint.upper) for joint in joints]).T
-        q = np.minimum(np.maximum(0.0, low), high)
-        return JointTrajectory(tuple(joint.name for joint in joints), q[None])
+        q = [min(max(0.0, joint.lower), joint.upper) for joint in joints]
+        return JointTrajectory(tuple(joint.name for joint in joints), np.array([q]))
 
     def drawing(self, motion: JointTrajectory) -> RobotDrawing:
         """How a motion looks."""

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import prod
-from mmap import mmap
+from mmap import MAP_ANONYMOUS, MAP_PRIVATE, mmap
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -35,8 +35,9 @@ def paged_zeros(*shape: int) -> FloatArray:
     if size < PAGES:
         return np.zeros(shape)
     try:
-        return np.frombuffer(mmap(-1, size), np.float64).reshape(shape)
-    except OSError as error:
+        pages = mmap(-1, size, MAP_PRIVATE | MAP_ANONYMOUS)
+        return np.frombuffer(pages, np.float64).reshape(shape)
+    except (OSError, OverflowError) as error:
         raise MemoryError(*error.args) from None
 
 

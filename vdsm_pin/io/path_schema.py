@@ -168,7 +168,8 @@ class TipPathModel(FileModel):
     insertion: list[Vector] = Field(
         default=[],
         description="Places between start and path by way of which strategy "
-        "follow-the-leader brings the tip in [length_unit].",
+        "follow-the-leader brings the tip in; searching strategies try it first "
+        "[length_unit].",
     )
     pointing: PointingModel | None = Field(
         default=None,

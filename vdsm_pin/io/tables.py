@@ -273,7 +273,8 @@ def quoted(text: str) -> str:
 
 def split(line: str, between: str) -> list[str]:
     """The values of a line, without quotes and without blanks around them."""
-    plain = re.sub(rf'" +(?={between}|$)', '"', line.strip("\n"))
+    blanks = " " if between == "\t" else r"[ \t]"
+    plain = re.sub(rf'"{blanks}+(?={between}|$)', '"', line.strip("\n"))
     try:
         (words,) = csv.reader(
             [plain], delimiter=between, skipinitialspace=True, strict=True

@@ -21,17 +21,30 @@ from vdsm_pin.io.source import decode, naming, read_bytes
 from vdsm_pin.io.xml_reader import declared
 from vdsm_pin.tolerances import TOLERANCES
 
-MAX_BYTES: Final = 8 << 20
-"""An attribute of more than 10 MB is dropped by lxml, which yourdfpy parses with."""
+MAX_BYTES: Final = 1 << 20
+"""An attribute of more than 10 MB is dropped by lxml, which yourdfpy parses with; a
+quote in one takes six bytes when it is handed on."""
 
-KEPT: Final = {
-    "robot": ("link", "joint"),
-    "link": ("collision",),
-    "collision": ("origin", "geometry"),
-    "geometry": ("box", "cylinder", "sphere"),
-    "joint": ("parent", "child", "origin", "axis", "limit", "mimic"),
+ATTRIBUTES: Final = {
+    "robot": ("name",),
+    "link": ("name",),
+    "collision": (),
+    "geometry": (),
+    "joint": ("name", "type"),
+    "parent": ("link",),
+    "child": ("link",),
+    "origin": ("xyz", "rpy"),
+    "axis": ("xyz",),
+    "limit": ("lower", "upper", "effort", "velocity"),
+    "mimic": ("joint",),
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
 }
-"""What each element of a URDF says of an arm."""
+"""What says something of an arm: elements and their attributes."""
+
+OF_MOVING: Final = ("axis", "limit", "mimic")
+"""Elements of joints that are read, and checked, of those that move within limits."""
 
 X, Y, Z = np.eye(3)
 IN_LINE: Final = "expected its origin on the x axis of the link before, unturned"
@@ -70,7 +83,7 @@ def read_urdf_arm(path: Path) -> UrdfArm:
     from yourdfpy import URDF  # slow to import, and only such files need it
 
     robot = URDF.load(
-        io.BytesIO(ET.tostring(_bare(document))),
+        io.BytesIO(ET.tostring(_bare(document), "utf-8")),
         build_scene_graph=False,
         load_meshes=False,
         load_collision_meshes=False,
@@ -84,9 +97,14 @@ def _bare(element: ET.Element) -> ET.Element:
     yourdfpy ends in a traceback at a colour that is none, and its parser passes over
     the rest of a document that is too deep.
     """
-    own = {name: value for name, value in element.items() if "{" not in name}
-    bare = ET.Element(element.tag, own)
-    bare.extend(_bare(one) for one in element if one.tag in KEPT.get(element.tag, ()))
+    told = {
+        k: element.get(k, "") for k in ATTRIBUTES[element.tag] if k in element.keys()
+    }
+    still = element.get("type") not in (None, "revolute", "prismatic")
+    bare = ET.Element(element.tag, told)
+    for child in element:
+        if child.tag in ATTRIBUTES and not (still and child.tag in OF_MOVING):
+            bare.append(_bare(child))
     return bare
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres, straight_joints
+from vdsm_pin.arm.kinematics import joint_centres, row_centres, straight_joints
 from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.fewest.follow_the_leader import way_back
@@ -53,9 +53,7 @@ def _from(
         start.tip, tip[None], blocked=Blocked.FAIL, start_joints=start.joints
     )
     if end is not None and end.joints is not None:
-        q = end.joints[None]
-        arm = problem.manipulator
-        centres = joint_centres(arm, q[:, 0], q[:, 1::2], q[:, 2::2])[0]
+        centres = row_centres(problem.manipulator, end.joints[None])[0]
         path = replace(path, insertion=way_back(centres)[::-1])
     return replace(problem, tip_path=path, start=None, goal=None)
 

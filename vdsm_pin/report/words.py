@@ -174,14 +174,17 @@ def check_cells(row: "CheckRow | Check") -> tuple[str, str]:
     """Worst value and limit of a check.
 
     A clearance is rounded to the safe side of what is proved of it: down, and up where
-    it is refuted by what it does not exceed.
+    it is refuted by what it does not exceed, unless that reads as its limit.
     """
     refuted = row.verdict == "refuted"
     whole: Whole | None = None
     if row.name.startswith(_CLEARANCE):
         whole = math.ceil if refuted else math.floor
     asked = limit(row.limit, row.unit, None if refuted else whole)
-    return depth(row.worst, row.deeper, row.unit, whole), asked
+    worst = depth(row.worst, row.deeper, row.unit, whole)
+    if refuted and whole and worst == asked:
+        worst = depth(row.worst, row.deeper, row.unit, math.floor)
+    return worst, asked
 
 
 def measured(value: float | None, unit: str) -> str:

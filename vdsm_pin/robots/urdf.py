@@ -45,7 +45,8 @@ def read_robot(files: RobotFiles) -> Robot:
     tree = Tree(tuple(reader.joints))
     disabled = more.disabled() if more is not None else {}
     unknown = more.notes() if more is not None else ()
-    odd = (*links.notes, *links.too_large(reach_of(tree)))
+    apart = any(joint.placement[:3, 3].any() for joint in tree.joints)
+    odd = (*links.notes, *(links.too_large(reach_of(tree)) if apart else ()))
     held, left_out = held_pairs(tree, bodies, disabled, more is None)
     return Robot(
         name=document.get("name", urdf.stem),

@@ -16,7 +16,9 @@ MAX_BYTES: Final = 16 << 20
 SCRIPT: Final = """
 import json, resource, sys, xacro
 from xacrodoc.cli import main
-resource.setrlimit(resource.RLIMIT_AS, (4 << 30, resource.RLIM_INFINITY))
+most, (_, hard) = 4 << 30, resource.getrlimit(resource.RLIMIT_AS)
+if hard == resource.RLIM_INFINITY or hard > most:
+    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
 try:
     main()
 finally:

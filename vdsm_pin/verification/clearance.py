@@ -210,7 +210,7 @@ def prove_clearance(
     step("proving the clearance of %d pairs", proof.question.n_pairs)
     with watched(lambda: proof.proving.share):
         late = not proof.proving.run()
-    results, told, sent = proof.proving.results, proof.told(), 0
+    results, told, sent = proof.proving.results, proof.told(in_time=not late), 0
     n_links = problem.manipulator.n_links
     if sinks:
         sent = _send(problem, trajectory, errors, proof, sinks, reach)

@@ -4,6 +4,7 @@ Whoever asks has the frames' poses, from Pinocchio where it can.
 """
 
 from collections.abc import Sequence
+from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -130,7 +131,7 @@ class CoalShapes:
             if (partner := partners[k]) is not None:
                 pose = coal.Transform3s(turn, shift)
                 answer = measure(request, shapes[number], pose, partner)
-                if not distance[k] <= answer.distance:
+                if isnan(distance[k]) or answer.distance < distance[k]:
                     distance[k], near[k], far[k] = answer
         return found
 

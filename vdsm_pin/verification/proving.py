@@ -42,9 +42,8 @@ class ProblemProof:
 
     def told(self, *, in_time: bool = True) -> Proof:
         """What was proved so far, in intervals of the path."""
-        return summed(
-            self.proving.results, self.question.plan, self.question.n_pairs, in_time
-        )
+        asked = self.question.plan, self.question.n_pairs
+        return summed(self.proving.results, *asked, in_time)
 
 
 def prove_problem(

@@ -27,7 +27,6 @@ from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.verification.link_clearance import link_clearance
 
 KEEP = built_in("hrm8").link_radius + 0.0035
-BOTH = [FEW_CELLS, MOST_CELLS]
 """What the tip keeps from every surface."""
 
 
@@ -85,7 +84,7 @@ def test_the_tip_of_a_plan_is_never_cut_off() -> None:
 def test_no_long_proof_is_tried_where_a_way_of_the_tip_is_known(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked: list[object] = []
+    asked, both = list[object](), [FEW_CELLS, MOST_CELLS]
 
     def counted(*given: object) -> NDArray[np.bool_]:
         asked.append(given[-1])
@@ -94,7 +93,7 @@ def test_no_long_proof_is_tried_where_a_way_of_the_tip_is_known(
     monkeypatch.setattr("vdsm_pin.planner.fewest.explore.cut_off", counted)
     centre = np.array([2.6, 0.5, 0.0])
     tips = centre + np.array([[0.2, 0.0, 0.0], [0.2, 0.1, 0.0]])
-    for window, tries in ((KEEP + 0.02, [FEW_CELLS]), (KEEP - 0.02, BOTH)):
+    for window, tries in ((KEEP + 0.02, [FEW_CELLS]), (KEEP - 0.02, both)):
         task = problem(
             *cage(window, np.eye(3), centre), points=tips, closed=False,
             start=(1.8, 0.0, 0.0),

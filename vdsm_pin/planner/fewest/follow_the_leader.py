@@ -11,6 +11,9 @@ from vdsm_pin.tolerances import TOLERANCES
 PARTS: Final = 8
 """Pieces of the curve between two joints."""
 
+SAME: Final = TOLERANCES.joint_centre
+"""Places no farther apart are one corner of a curve; [m]."""
+
 
 @compiled
 def _beyond(
@@ -115,11 +118,10 @@ def _laid_along(route: FloatArray, own: FloatArray, lengths: FloatArray) -> Floa
     curve[points:] = own
     at, result = points, np.zeros((points, count + 1, 3))
     for k in range(points):
-        if at + 1 < curve.shape[0] and (route[k] == curve[at + 1]).all():
-            at += 1
-        else:
-            at -= 1
-            curve[at] = route[k]
+        behind = at + 1 < curve.shape[0]
+        back = behind and np.abs(route[k] - curve[at + 1]).max() <= SAME
+        at += 1 if back else -1
+        curve[at] = route[k]
         result[k, count] = route[k]
         _lay(curve, at + 1, lengths, result[k])
     return result
@@ -169,7 +171,7 @@ def way_back(start: FloatArray) -> FloatArray:
         Corners of its own curve, its tip first, shape (k, 3), k = 1 if it is straight.
     """
     curve = np.concatenate([start[-1:], own_curve(start)[:-1]])
-    bent = np.flatnonzero(np.abs(curve[:, 1:]).max(axis=1) > TOLERANCES.joint_centre)
+    bent = np.flatnonzero(np.abs(curve[:, 1:]).max(axis=1) > SAME)
     return curve[: bent[-1] + 2] if bent.size else curve[:1]
 
 

@@ -32,8 +32,8 @@ from vdsm_pin.tolerances import TOLERANCES
 
 MOST_CELLS: Final = 60_000
 """Cells at which a search ends; it has taken a second or two by then."""
-FEW_CELLS: Final = 4_000
-"""Cells at which a first look ends, a tenth of a second."""
+FEW_CELLS: Final = 16_000
+"""Cells at which a first look ends, a tenth or two of a second."""
 LIGHT: Final = 0.02
 """Doubt of a cell whose centre is clear over that of another; [-]."""
 LIKELY: Final = 0.5
