@@ -69,6 +69,18 @@ def test_the_server_hands_out_the_page_and_lets_go_of_its_port() -> None:
         again.bind(("127.0.0.1", port))
 
 
+def test_a_connection_that_is_cut_is_passed_over_and_no_other_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with ViewServer("paper/free", None, 0, watch=False) as server:
+        for error, told in ((OSError(9, "Bad file"), False), (KeyError("k"), True)):
+            try:
+                raise error
+            except (OSError, KeyError):
+                server.handle_error(None, ("127.0.0.1", 1))
+            assert ("Exception occurred" in capsys.readouterr().err) is told
+
+
 def test_a_robot_is_shown_with_its_motion_or_where_it_begins(tmp_path: Path) -> None:
     new_project(tmp_path / "cell", "robot")
     urdf, problem = tmp_path / "cell" / "robot.urdf", tmp_path / "cell" / "problem.yaml"

@@ -5,13 +5,14 @@ process: it hands the page out, and tells it when a file has changed.
 """
 
 import hashlib
+import sys
 import time
 from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Lock
-from typing import Final
+from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
 from vdsm_pin.app.subjects import ProblemOrCell, read_problem_or_cell, subject_of
@@ -126,6 +127,11 @@ class ViewServer(ThreadingHTTPServer):
             time.sleep(_LOOK)
         return False
 
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Pass over readers that went away, and what an interrupt cuts off."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
     def server_close(self) -> None:
         """Let go of the port and of the pages that wait."""
         self.ended = True
@@ -151,15 +157,12 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, kind: str, text: str) -> None:
         body = text.encode("utf-8")
-        try:
-            self.send_response(HTTPStatus.OK)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-            self.send_header("Cache-Control", "no-store")
-            self.end_headers()
-            self.wfile.write(body)
-        except ConnectionError:
-            self.close_connection = True  # the reader went away
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        self.wfile.write(body)
 
     def log_message(self, format: str, *arguments: object) -> None:
         """Requests are not worth a line."""
