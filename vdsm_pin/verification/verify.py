@@ -52,7 +52,7 @@ from vdsm_pin.verification.limits import check_limits, checks_of_others
 from vdsm_pin.verification.moving import check_timed
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
-from vdsm_pin.verification.records import ArmVerification, Check, Counterexample
+from vdsm_pin.verification.records import ArmVerification, Check, Counterexample, Pair
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.task import ArmPairs, all_pairs
 from vdsm_pin.verification.tip import check_tip
@@ -96,8 +96,9 @@ def verify(
     located = locate_arm(problem, trajectory, box, deadline)
     enclosed = bodies_inside(problem, trajectory, arm_inside(located))
     judgement = _Judgement(problem, trajectory, deadline)
-    inside = pairs_inside(problem, all_pairs(problem), enclosed)
-    proved = judgement.proved(inside, sinks, reach)
+    pairs = all_pairs(problem)
+    inside = pairs_inside(problem, pairs, enclosed)
+    proved = judgement.proved(pairs, inside, sinks, reach)
     proof = proved.proof
     least = enclosed_least(proof.least, inside)
     counterexamples = judgement.counterexamples(proof)
@@ -189,11 +190,14 @@ class _Judgement:
         self.deadline, self.extras = deadline, BestEffort()
 
     def proved(
-        self, inside: Mapping[int, Inside], sinks: Sequence[ClearanceSink], reach: float
+        self,
+        pairs: Sequence[Pair],
+        inside: Mapping[int, Inside],
+        sinks: Sequence[ClearanceSink],
+        reach: float,
     ) -> _Proved:
         """The clearance of every pair; `sinks` and `reach` are those of `verify`."""
         problem, trajectory = self.problem, self.trajectory
-        pairs = all_pairs(problem)
         wanted = [EnclosedSink(one, pairs, inside) if inside else one for one in sinks]
         lowers = LowersSink(problem, trajectory)
         noted = TooClose(pairs, max(1, trajectory.n_samples - 1))
