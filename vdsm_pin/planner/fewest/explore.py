@@ -278,12 +278,15 @@ def _cut_off(
     A long look is worth it only where no way of the tip is known.
     """
     there, tips = held_from(problem, TIP_ONLY), outcome.rows.tips
-    for most in (FEW_CELLS, MOST_CELLS):
+
+    def looked(most: int) -> Outcome:
         found = cut_off(there, tips, clearance.deadline, most)
-        outcome = replace(outcome, proof=replace(outcome.proof, cut_off=found))
-        if outcome.proof.closed.all() or (space and _leads_there(space, outcome)):
-            break
-    return outcome
+        return replace(outcome, proof=replace(outcome.proof, cut_off=found))
+
+    first = looked(FEW_CELLS)
+    if first.proof.closed.all() or (space and _leads_there(space, first)):
+        return first
+    return looked(MOST_CELLS)
 
 
 def _hemmed_in(
