@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.hrm1000.families import FAMILIES as FIRST
 from benchmarks.hrm2000.attempt import Outcome
 from benchmarks.hrm2000.catalogue import FAMILIES, INFEASIBLE, has_witness
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY as OURS
@@ -114,9 +115,17 @@ def missed(outcomes: list[Outcome], limit: float) -> str:
 
 
 def not_run(outcomes: list[Outcome]) -> str:
-    """Families that nothing was planned of."""
-    missing = [f for f in FAMILIES if f not in {o.family for o in outcomes}]
-    return f" Not run: {', '.join(missing)}." if missing else ""
+    """Families that nothing was planned of, where not those of HRM-1000 are asked."""
+    run = {o.family for o in outcomes}
+    missing = [f for f in FAMILIES if f not in run]
+    return f" Not run: {', '.join(missing)}." if missing and run != {*FIRST} else ""
+
+
+def title(outcomes: list[Outcome], version: int) -> str:
+    """Which benchmark it is: the families of HRM-1000 are a part of HRM-2000."""
+    if {o.family for o in outcomes} == {*FIRST}:
+        return f"HRM-1000, as planned in HRM-2000, version {version}"
+    return f"HRM-2000, version {version}"
 
 
 def document(outcomes: list[Outcome], settings: dict[str, Any]) -> str:
@@ -126,7 +135,7 @@ def document(outcomes: list[Outcome], settings: dict[str, Any]) -> str:
     counts = Counter(o.method for o in outcomes)
     tried = ", ".join(f"{count} by {method}" for method, count in counts.items())
     return (
-        f"# HRM-2000, version {settings['benchmark']}\n\n"
+        f"# {title(outcomes, settings['benchmark'])}\n\n"
         f"Problems tried: {tried}.{not_run(outcomes)} Limit {limit:g} s of processor "
         f"time for planning, without the proof; times and knees are of what is solved. "
         f"{settings['processor']}, {settings['processes']} processes while the machine "

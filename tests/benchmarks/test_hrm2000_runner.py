@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from some_slow import few_of
 
+from benchmarks.hrm1000.families import FAMILIES as FIRST
 from benchmarks.hrm2000 import attempt as attempts
 from benchmarks.hrm2000 import run
 from benchmarks.hrm2000.arms import PAPER
@@ -33,6 +34,10 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
 GOOD = Outcome("port-0000", "port", 0, "fewest", "certified", "", 1.0, 2.0, 1.0, 2.0, 3)
+SETTINGS = {
+    "time_limit_s": 60.0, "versions": {"numpy": "2"}, "benchmark": 3,
+    "processor": "p", "code": "c", "processes": 1, "python": "3",
+}  # fmt: skip
 
 
 def test_solved_is_certified_whole_faultless_and_in_time() -> None:
@@ -80,14 +85,18 @@ def test_a_limit_of_processor_time_goes_by_the_processors_clock(monkeypatch) -> 
 
 
 def test_the_page_names_what_was_missed_and_what_was_not_run() -> None:
-    settings = {
-        "time_limit_s": 60.0, "versions": {"numpy": "2"}, "benchmark": 3,
-        "processor": "p", "code": "c", "processes": 1, "python": "3",
-    }  # fmt: skip
-    page = document([GOOD, replace(GOOD, number=1, answer="not found")], settings)
+    page = document([GOOD, replace(GOOD, number=1, answer="not found")], SETTINGS)
     assert "| port | fewest | 1/2 (50%) |" in page
     assert "* port-0000: not found" in page
     assert "Not run: prismatic_x" in page
+
+
+def test_the_families_of_hrm1000_alone_are_a_page_of_that_name() -> None:
+    outcomes = [replace(GOOD, family=family) for family in FIRST]
+    page = document(outcomes, SETTINGS)
+    assert page.startswith("# HRM-1000") and "Not run" not in page
+    fewer = document(outcomes[1:], SETTINGS)
+    assert fewer.startswith("# HRM-2000") and f"Not run: {outcomes[0].family}" in fewer
 
 
 def test_a_run_goes_on_only_with_the_same_code_and_limit(
