@@ -211,6 +211,33 @@ def test_times_that_do_not_rise_are_refused(
     assert "times do not rise" in made.check(lines).reason
 
 
+def test_a_group_is_one_of_a_srdf(tmp_path: Path) -> None:
+    made = Made(tmp_path)
+    files = RobotFiles(made.folder / "all.urdf", group="arm")
+    with pytest.raises(Rejected, match="a group without a SRDF"):
+        Model(files, np.eye(4))
+
+
+@pytest.mark.parametrize("leader", ["follow", "later", "nobody", "base", ""])
+def test_a_joint_follows_one_of_one_value(tmp_path: Path, leader: str) -> None:
+    """Not itself, one that follows it in turn, none at all or one of three values."""
+    joints = (
+        ("base", "planar", "a", "b", ""),
+        ("follow", "revolute", "b", "c", f'<mimic joint="{leader}"/>'),
+        ("later", "revolute", "c", "d", '<mimic joint="follow"/>'),
+    )
+    text = "".join(
+        f'<link name="{child}"/><joint name="{name}" type="{kind}">'
+        f'<parent link="{parent}"/><child link="{child}"/>{more}'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for name, kind, parent, child, more in joints
+    )
+    path = tmp_path / "r.urdf"
+    path.write_text(f'<robot name="r"><link name="a"/>{text}</robot>')
+    with pytest.raises(Rejected, match="no value that another could follow"):
+        Model(RobotFiles(path), np.eye(4))
+
+
 SHAPED = """<robot name="r"><link name="l"><collision><origin xyz="-2 0 0"/>
 <geometry>{}</geometry></collision></link></robot>"""
 BALL = {"origin_m": [0.75, 0.0, 0.0], "edges_m": [], "radius_m": 0.5}

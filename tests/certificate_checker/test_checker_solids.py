@@ -8,7 +8,14 @@ import pytest
 
 from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.certificate_checker.balls import Rejected
-from vdsm_pin.certificate_checker.solids import Solid, away, boundary, hulls, sizes
+from vdsm_pin.certificate_checker.solids import (
+    Solid,
+    away,
+    boundary,
+    cover,
+    hulls,
+    sizes,
+)
 from vdsm_pin.geometry.solids import Mesh, PointCloud, Sphere
 
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
@@ -132,6 +139,23 @@ def test_hulls_of_closed_meshes_share_a_point_where_they_share_a_corner(
     for points, group, middle in zip(found, groups, middles, strict=True):
         expected = np.unique([*corners[group].reshape(-1, 3), middle], axis=0)
         np.testing.assert_allclose(points, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        ({"joined": {"ball": [[[0, 0]], []]}}, "ball is no mesh: nothing is joined"),
+        ({"joined": {"": [[[0, 0]], []]}}, " is no mesh: nothing is joined"),
+        ({"links": {"foot": {}}}, "links without solids are told of"),
+        ({"pieces": {"ball": []}}, "pieces of ball do not make up the whole"),
+    ],
+)
+def test_what_a_certificate_tells_of_is_there(more: Any, reason: str) -> None:
+    ball = Solid("ball", [[[0.0, 0.0, 0.0]]], radius=1.0)
+    header: Any = {"links": {"tool": {}}, "pieces": {"ball": [0]}, "joined": {}}
+    cover([ball], header, ["tool"])
+    with pytest.raises(Rejected, match=reason):
+        cover([ball], header | more, ["tool"])
 
 
 def test_sizes_that_nobody_states_are_told_of_all_that_stands_in_files() -> None:
