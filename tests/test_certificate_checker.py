@@ -2,6 +2,8 @@
 
 import copy
 import json
+import runpy
+import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -549,6 +551,18 @@ def test_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main([*files[:2], str(tmp_path / "none.csv")]) == 2
     assert "none.csv" in capsys.readouterr().err
     assert main(files[:2]) == 2
+
+
+@pytest.mark.parametrize(("more", "status"), [([], 0), (["one"], 2)])
+def test_the_module_runs_as_a_program(
+    more: list[str], status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
+    files = [str(x) for x in (case.certificate, case.problem, case.trajectory)]
+    monkeypatch.setattr(sys, "argv", ["checker", *files, *more])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("vdsm_pin.certificate_checker", run_name="__main__")
+    assert ended.value.code == status
 
 
 @pytest.mark.parametrize("said", ["", "Unable to allocate 2 GiB"])

@@ -41,6 +41,7 @@ GROUPS: Final = (
             "tests/verification/test_half_laps.py",
             "tests/verification/test_inside.py",
             "tests/io/test_two_readers.py",
+            "tests/robots/test_inside_robots.py",
         ),
     ),
     Group(

@@ -1,7 +1,8 @@
 """What a plane proves, and which pairs and lines there must be."""
 
+from collections.abc import Iterator
 from itertools import product
-from pathlib import Path
+from pathlib import Path as File
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,8 +15,8 @@ from oracles.certificate_oracle import sealed
 from vdsm_pin.certificate_checker import check_certificate, claims
 from vdsm_pin.certificate_checker.arm import Arm
 from vdsm_pin.certificate_checker.balls import UP, Rejected
-from vdsm_pin.certificate_checker.claims import Plane, clearances, tiled
-from vdsm_pin.certificate_checker.motion import Interval, Slices
+from vdsm_pin.certificate_checker.claims import Clearances, Plane, clearances, tiled
+from vdsm_pin.certificate_checker.motion import Branch, Interval, Path, Slices
 from vdsm_pin.certificate_checker.solids import Body, Pair, Solid
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
 
@@ -116,7 +117,7 @@ def test_names_are_ignored_in_either_order_with_all_their_parts() -> None:
         assert Arm._ignored(arm, one, other) is expected  # type: ignore[arg-type]
 
 
-def test_a_certificate_without_an_interval_is_refused(tmp_path: Path) -> None:
+def test_a_certificate_without_an_interval_is_refused(tmp_path: File) -> None:
     case = random_case(np.random.default_rng(0), tmp_path, [SHAPES[0]])
     for kept in range(1, len(case.lines)):
         case.certificate.write_bytes(sealed(case.lines[:kept]))
@@ -126,7 +127,7 @@ def test_a_certificate_without_an_interval_is_refused(tmp_path: Path) -> None:
 
 
 def test_as_much_as_is_proved_may_be_claimed_to_the_last_bit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: File, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     case, proved = random_case(np.random.default_rng(4), tmp_path, ["box"]), {}
     kept = claims.clearances
@@ -212,3 +213,32 @@ def test_slices_are_tiled(ends: list[tuple[float, float]], reason: str) -> None:
     else:
         planes = [*tiled(pair, proof, "", interval)]
         assert [one.slice for one in planes] == [(interval, *both) for both in ends]
+
+
+@pytest.mark.parametrize("at_once", [0, 1, 5])
+def test_planes_are_settled_before_more_wait_than_are_looked_at_at_once(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plane that proves too little is told of before later lines are read."""
+    monkeypatch.setattr(claims, "AT_ONCE", at_once)
+    tree = Tree([Joint(0, SLIDES, (0, 0, 1), np.eye(4), (0, 1.0, 0.0))])
+    rest = Solid("b", [[[0.0, 3.0, 0.0]]])
+    pair = Pair(Body(1, Solid("a", [[[0.0, 0.0, 0.0]]])), rest, 0, 0.0, 0.0)
+    read = []
+
+    def lines(wrong: int) -> Iterator[dict[str, Any]]:
+        for k in range(20):
+            read.append(k)
+            lower = 3.1 if k == wrong else 2.9
+            yield {"k": k, "proofs": [[[0.0, 1.0, [[0, 1, 0.0, 1.0, 0.0, lower]]]]]}
+
+    path = Path(Branch(np.zeros((21, 1)), None))
+    good = Clearances(tree, path, [pair])
+    good.check(lines(-1))
+    assert (good.n_intervals, good.n_claims) == (20, 20)
+    for wrong in (0, 7):
+        read.clear()
+        with pytest.raises(Rejected, match="claims 3100 mm, proves 3000 mm"):
+            Clearances(tree, path, [pair]).check(lines(wrong))
+        assert wrong <= read[-1] <= wrong + at_once
+        assert (read[-1] + 1) % (at_once + 1) == 0

@@ -15,6 +15,7 @@ from vdsm_pin.certificate_checker.solids import (
     cover,
     hulls,
     sizes,
+    solid,
 )
 from vdsm_pin.geometry.solids import Mesh, PointCloud, Sphere
 
@@ -56,6 +57,33 @@ def test_pieces_of_a_prism_are_no_more_corners_than_its_triangles() -> None:
     prism().cut([*halves, *there_and_back])  # 12 corners of 12
     with pytest.raises(Rejected, match="do not make up the whole"):
         prism().cut([*halves, [0, 1, 2, 3], [3, 2, 1, 0]])
+
+
+def test_a_prism_on_a_link_is_covered_by_the_pieces_of_its_section() -> None:
+    """Each is the prism over one polygon; the whole one keeps its name."""
+    (whole,) = prism().parts(None)
+    assert whole.name == "bar"
+    np.testing.assert_array_equal(whole.points, prism().points)
+    found, square = prism().parts([[0, 1, 2], [0, 2, 3]]), np.array(SQUARE)
+    for k, (part, corners) in enumerate(
+        zip(found, ([0, 1, 2], [0, 2, 3]), strict=True)
+    ):
+        flat = square[corners]
+        both = [np.column_stack([flat, np.full(3, z)]) for z in (0.0, 1.0)]
+        np.testing.assert_array_equal(part.points, [np.vstack(both)])
+        assert part.name == f"bar part {k + 1}"
+        assert part.extent == 1.0 + prism().extent  # worked out of what may be so far
+
+
+def test_a_cloud_is_a_ball_about_each_of_its_points() -> None:
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(7, 3))
+    n = points[2] / np.linalg.norm(points[2])
+    cloud = solid(PointCloud("scan", points, 0.25))
+    for first, last in ((0, 7), (2, 3), (4, 6)):
+        least = min(float(point @ n) for point in points[first:last]) - 0.25
+        assert cloud.support(n, first, last) == pytest.approx(least, rel=0, abs=1e-15)
+    assert cloud.extent == pytest.approx(np.abs(points).max() + 0.25)
 
 
 def test_boundaries_cancel_where_loops_run_both_ways() -> None:
