@@ -141,9 +141,30 @@ def test_arguments_of_another_kind_are_refused_in_a_sentence() -> None:
     still = vp.Trajectory([False], [0.0], [0.0], motion, motion)
     refused: dict[str, Callable[[], object]] = {
         "found str": lambda: vp.plan("paper/free"),  # type: ignore[arg-type]
-        "trajectory; found PlanningProblem": lambda: vp.verify(problem, problem),  # type: ignore[arg-type]
+        "trajectory; found Problem$": lambda: vp.verify(problem, problem),  # type: ignore[arg-type]
         "expected ErrorBox": lambda: vp.verify(problem, still, errors=1.0),  # type: ignore[arg-type]
         "limit is nan": lambda: vp.verify(problem, still, time_limit=np.nan),
+        "limit is '5'": lambda: vp.plan(problem, time_limit="5"),  # type: ignore[arg-type]
+        "expected Problem, as of": lambda: vp.plan(None),  # type: ignore[arg-type]
+        "file, as text or Path; found NoneType": lambda: vp.read_problem(None),  # type: ignore[arg-type]
+        "file, as text or Path; found bytes": lambda: vp.read_problem(b"paper/free"),  # type: ignore[arg-type]
+        "file, as text or Path; found int": lambda: vp.write_trajectory(3, still),  # type: ignore[arg-type]
+        "pinned is 3, expected": lambda: vp.repair_trajectory(problem, still, 3),  # type: ignore[arg-type, call-overload]
+        "pinned is .1.5., expected": lambda: vp.repair_trajectory(
+            problem,
+            still,
+            [1.5],  # type: ignore[list-item]
+        ),
+        "topic is of a robot's": lambda: vp.read_trajectory("a", problem, topic="b"),  # type: ignore[call-overload]
+        "'wavy', expected one of auto, linear": lambda: vp.read_trajectory(
+            "a",
+            problem,
+            "wavy",  # type: ignore[call-overload]
+        ),
+        "expected obstacles, as Sphere or Box; found str": lambda: vp.Scene("ab"),  # type: ignore[arg-type]
+        "obstacles is a Sphere, expected": lambda: vp.Scene(vp.Sphere("a", [0] * 3, 1)),  # type: ignore[arg-type]
+        "name of a solid is 5": lambda: vp.Sphere(5, [0, 0, 0], 1),  # type: ignore[arg-type]
+        r"name of a solid is '\\x1b\[2J'": lambda: vp.Sphere("\x1b[2J", [0, 0, 0], 1),  # type: ignore[arg-type]
         "no rigid motion": lambda: replace(problem, T_world_base=2.0 * np.eye(4)),
     }
     for expected, call in refused.items():
@@ -161,6 +182,31 @@ def test_errors_are_equal_in_whatever_units_they_were_stated() -> None:
     assert {kept, stated} == {stated}
     assert kept != vp.ErrorBox(base_mm=2.0)
     assert kept != 0.002
+
+
+def test_arguments_that_an_error_box_has_not_are_refused_by_its_public_name() -> None:
+    with pytest.raises(TypeError, match=r"^ErrorBox\(\) got an unexpected .* 'base'"):
+        vp.ErrorBox(base=1.0)  # type: ignore[call-arg]
+
+
+def test_numbers_of_numpy_are_time_limits() -> None:
+    problem = vp.read_problem("paper/free")
+    for limit in (np.float32(500.0), np.int64(500)):
+        assert vp.plan(problem, "paper", time_limit=limit).trajectory.n_samples  # type: ignore[arg-type]
+
+
+def test_no_result_shows_more_clearance_than_is_proved() -> None:
+    problem = in_python()
+    result = vp.verify(problem, vp.plan(problem).trajectory)
+    lower = np.full_like(result.least.lower, 0.0123458)
+    shown = replace(result, least=replace(result.least, lower=lower))
+    assert "12.345 mm" in repr(shown)
+    near = result.closest(1)[0]
+    assert repr(near).startswith("ClosestApproach(link ")
+    assert "\n" not in repr(near)
+    assert "at least 12.345 mm" in repr(replace(near, lower=0.0123458))
+    assert "at least −0.001 mm" in repr(replace(near, lower=-1e-9))
+    assert result.closest(-1) == ()
 
 
 def test_results_show_themselves_in_a_few_lines() -> None:

@@ -163,7 +163,7 @@ def test_what_is_of_no_robot_is_refused_in_a_sentence(
     refused: dict[str, Callable[[], object]] = {
         "found JointTrajectory": lambda: vp.verify(arm, SWEEP),  # type: ignore[call-overload]
         "found Trajectory": lambda: vp.verify(cell, still),  # type: ignore[call-overload]
-        "expected PlanningProblem": lambda: vp.plan(cell),  # type: ignore[arg-type]
+        "expected Problem, as": lambda: vp.plan(cell),  # type: ignore[arg-type]
         "expected Cell": lambda: vp.verify("cell.yaml", SWEEP),  # type: ignore[call-overload]
         "of snake arms": lambda: vp.verify(cell, SWEEP, joint_error=True),  # type: ignore[call-overload]
         "no joint 'turn'": lambda: vp.verify(cell, replace(SWEEP, names=("x",))),
@@ -191,3 +191,34 @@ def test_a_cell_shows_itself_in_a_few_lines(cell: vp.Cell) -> None:
         assert len(repr(value).splitlines()) < 12
         assert value._repr_html_().startswith("<table>")
     assert "turn" in repr(cell)
+
+
+def test_values_of_another_kind_are_refused_in_a_sentence(
+    cell: vp.Cell, files: vp.RobotFiles
+) -> None:
+    still = [[0.0], [float("nan")]]
+    refused: dict[str, Callable[[], object]] = {
+        "joint 'turn' is nan at waypoint 1": lambda: vp.JointTrajectory(
+            ("turn",),
+            still,  # type: ignore[arg-type]
+        ),
+        "names are .3,., expected text": lambda: vp.JointTrajectory((3,), [[0.0]]),  # type: ignore[arg-type]
+        "expected RobotFiles, as of": lambda: vp.cell_of("one.urdf"),  # type: ignore[arg-type]
+        "text or Path; found NoneType": lambda: vp.RobotFiles(None),  # type: ignore[arg-type]
+        "text or Path; found int": lambda: vp.RobotFiles(files.urdf, srdf=3),  # type: ignore[arg-type]
+        "interpolation is of a snake arm's": lambda: vp.read_trajectory(
+            "a.csv",
+            cell,
+            "linear",  # type: ignore[call-overload]
+        ),
+    }
+    for expected, call in refused.items():
+        with pytest.raises(vp.InvalidInput, match=expected):
+            call()
+
+
+def test_the_problem_of_an_arm_is_no_cell(tmp_path: Path) -> None:
+    file = tmp_path / "arm.yaml"
+    file.write_text("vdsm_problem: 1\nmanipulator: hrm8\n")
+    with pytest.raises(vp.InvalidInput, match="snake arm, which read_problem reads"):
+        vp.read_cell(file)

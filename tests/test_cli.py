@@ -122,6 +122,8 @@ def test_the_installed_command_answers_before_libraries_are_loaded() -> None:
         ["batch", "--out", "x", "--jobs", "0"],
         ["batch", "--out", "x", "--time-limit", "-1"],
         ["view", "paper/free", "--port", "99999"],
+        ["view", "paper/free", "--html", "x.html", "--watch"],
+        ["view", "paper/free", "--html", "x.html", "--port", "8000"],
         ["convert", "paper/free", "--out", "x"],
         ["convert", "paper/free", "--out", "x", "--cables", "a", "--centres", "b"],
     ],

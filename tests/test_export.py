@@ -124,6 +124,11 @@ def test_a_motion_plays_evenly_by_what_moves_most_and_by_its_own_times() -> None
         (["--out", "a.png", "--moment", "3"], "a waypoint from 0 to 0"),
         (["--out", "a.mp4"], "an MP4 needs ffmpeg: 'nothing' is not installed"),
         (["--out", "near.yaml"], "ends in none of"),
+        (["--out", "a.glb", "--moment", "3"], "--moment has no meaning with .glb"),
+        (["--out", "a.GLB", "--look", "side"], "--look has no meaning with .glb"),
+        (["--out", "a.glb", "--width", "99"], "--width has no meaning with .glb"),
+        (["--out", "a.png", "--seconds", "3"], "--seconds has no meaning with .png"),
+        (["--out", "a.mp4", "--moment", "3"], "--moment has no meaning with .mp4"),
     ],
 )
 def test_what_cannot_be_exported_is_one_message(

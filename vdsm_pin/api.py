@@ -9,14 +9,16 @@
 """
 
 from collections.abc import Sequence
+from operator import index
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, get_args, overload
 
 from vdsm_pin.app.motions import NO_OPTIONS, Motion, MotionOptions, expect
 from vdsm_pin.app.problems import read_problem as read_problem
 from vdsm_pin.app.subjects import ProblemOrCell, Subject, subject_of
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.io.source import path_of
 from vdsm_pin.io.trajectory_file import Interpolation
 from vdsm_pin.io.trajectory_file import write_trajectory as write_arm_trajectory
 from vdsm_pin.planner.records import Plan
@@ -149,13 +151,24 @@ def _subject(
     """The subject of a problem, its clearances asked for under more errors.
 
     Raises:
-        InvalidInput: If the problem is neither `PlanningProblem` nor `Cell`, or the
-            errors are no error box.
+        InvalidInput: If the problem is neither `PlanningProblem` nor `Cell`, the errors
+            are no error box, or an option is of problems of the other kind.
     """
-    if not isinstance(problem, PlanningProblem):
+    if options.interpolation not in get_args(Interpolation):
+        known = ", ".join(get_args(Interpolation))
+        message = f"interpolation is {options.interpolation!r}, expected one of {known}"
+        raise InvalidInput(message)
+    if isinstance(problem, PlanningProblem):
+        if options.topic is not None:
+            message = "topic is of a robot's motion, in a bag; this is a snake arm"
+            raise InvalidInput(message)
+    else:
         from vdsm_pin.robots.cell import Cell
 
         expect(problem, Cell, "read_cell(path); or a Problem, as of read_problem(path)")
+        if options.interpolation != "auto":
+            message = "interpolation is of a snake arm's rows; a robot's have their own"
+            raise InvalidInput(message)
     if errors is not None:
         problem = problem.under(expect(errors, Box, "ErrorBox(base_mm=1.0)"))
     return subject_of(problem, options)
@@ -213,7 +226,12 @@ def repair_trajectory(
         0.0
     """
     subject = _subject(problem, MotionOptions(Deadline.after(time_limit)))
-    return subject.repair(subject.checked(trajectory), tuple(pinned))
+    try:
+        rows = tuple(map(index, pinned))
+    except TypeError:
+        message = f"pinned is {pinned!r}, expected numbers of rows, such as [3, 4]"
+        raise InvalidInput(message) from None
+    return subject.repair(subject.checked(trajectory), rows)
 
 
 def write_report(result: Verification, path: str | Path) -> None:
@@ -238,7 +256,7 @@ def write_report(result: Verification, path: str | Path) -> None:
 
     subject, source = _judged(result), result.problem.source
     record = RunRecord.of(PYTHON, source, subject.urdf_sha256)
-    check_kept([Path(path)], () if source is None else source.files)
+    check_kept([path_of(path)], () if source is None else source.files)
     with atomic_path(path) as temporary:
         write(temporary, result, verification_file(result, record))
 
@@ -290,7 +308,7 @@ def write_certificate(
     if isinstance(result, ArmVerification):
         joined = result.trajectory.interpolation
     subject = _judged(result, MotionOptions(interpolation=joined, topic=topic))
-    file, source = Path(trajectory), result.problem.source
+    file, source = path_of(trajectory), result.problem.source
     if source is None or not source.is_whole:
         message = "a certificate is bound to a problem file; this problem has none"
         raise InvalidInput(message)
@@ -301,9 +319,9 @@ def write_certificate(
     if not same:
         message = f"{trajectory}: is another motion than the verified one"
         raise InvalidInput(message)
-    check_kept([Path(path)], [*source.files, file])
+    check_kept([path_of(path)], [*source.files, file])
     hashes = Hashes(problem=source.sha256, trajectory=digest)
-    subject.certify(Path(path), result, hashes)
+    subject.certify(path_of(path), result, hashes)
 
 
 @overload
@@ -351,7 +369,7 @@ def read_trajectory(
         8
     """
     options = MotionOptions(interpolation=interpolation, topic=topic)
-    motion: Motion = _subject(problem, options).read(Path(path))
+    motion: Motion = _subject(problem, options).read(path_of(path))
     return motion
 
 
@@ -371,7 +389,7 @@ def write_trajectory(
     """
     if problem is None:
         how = "plan(problem).trajectory; or with problem=, of a robot"
-        write_arm_trajectory(path, expect(trajectory, Trajectory, how))
+        write_arm_trajectory(path_of(path), expect(trajectory, Trajectory, how))
     else:
         subject = _subject(problem)
-        subject.write(Path(path), subject.checked(trajectory))
+        subject.write(path_of(path), subject.checked(trajectory))

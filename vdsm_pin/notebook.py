@@ -1,7 +1,18 @@
 """How results show themselves in a console and in a notebook."""
 
+from collections.abc import Mapping
 from html import escape
 from math import floor
+from types import MappingProxyType
+from typing import Final
+
+_KNOWN_AS: Final[Mapping[str, str]] = MappingProxyType({"PlanningProblem": "Problem"})
+"""Classes that the package hands out by another name."""
+
+
+def known_as(kind: type[object]) -> str:
+    """The name by which `import vdsm_pin` has a class."""
+    return _KNOWN_AS.get(kind.__name__, kind.__name__)
 
 
 class Summarised:
@@ -16,7 +27,7 @@ class Summarised:
         rows = self.summary()
         width = max(len(name) for name, _ in rows)
         lines = (f"  {name.ljust(width)}  {value}" for name, value in rows)
-        return "\n".join([type(self).__name__, *lines])
+        return "\n".join([known_as(type(self)), *lines])
 
     def _repr_html_(self) -> str:
         """The same as a table."""

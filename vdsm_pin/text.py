@@ -15,6 +15,12 @@ LONGEST: Final = 4_000
 """Characters of one message; what a file holds may be longer."""
 
 
+UNSEEN: Final = (
+    r"\x00-\x1f\x7f-\x9f\xad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff"
+)
+"""Signs that cannot be seen, end lines or turn the direction of writing."""
+
+
 def printable(text: str) -> str:
     r"""One line in which every sign can be seen, for terminals and files.
 

@@ -42,9 +42,10 @@ class Deadline:
         if seconds is None:
             return cls()
         if not isinstance(seconds, Real) or isnan(seconds):
-            message = f"the time limit is {seconds}, expected seconds"
+            message = f"the time limit is {seconds!r}, expected seconds"
             raise InvalidInput(message)
-        return cls(seconds, time.monotonic() + seconds)
+        limit = float(seconds)
+        return cls(limit, time.monotonic() + limit)
 
     @property
     def passed(self) -> bool:

@@ -69,6 +69,18 @@ def test_each_change_is_named_with_its_direction(
     assert len(diff_lines((change,))) == 2
 
 
+def test_the_clearance_of_a_first_obstacle_is_neither_better_nor_worse(
+    tmp_path: Path,
+) -> None:
+    free = ROW.model_copy(update={"min_clearance_lower_m": None})
+    old, new = folder(tmp_path / "old", free), folder(tmp_path / "new", ROW)
+    (change,) = compare_folders(old, new)
+    assert change.worse is None
+    lines = diff_lines((change,))
+    assert lines[0].startswith("· new     a: smallest proved clearance not available →")
+    assert lines[1].startswith("0 worse, 0 better, 1 new; ")
+
+
 def test_missing_and_new_problems_show(tmp_path: Path) -> None:
     other = ROW.model_copy(update={"folder": "b"})
     old, new = folder(tmp_path / "old", ROW), folder(tmp_path / "new", other)

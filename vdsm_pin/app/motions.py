@@ -6,6 +6,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.trajectory_file import Interpolation
+from vdsm_pin.notebook import known_as
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
@@ -51,8 +52,8 @@ def expect(value: Any, kind: type[T], how: str) -> T:
         InvalidInput: If the value has another type.
     """
     if not isinstance(value, kind):
-        found = type(value).__name__
-        message = f"expected {kind.__name__}, as of {how}; found {found}"
+        found = known_as(type(value))
+        message = f"expected {known_as(kind)}, as of {how}; found {found}"
         raise InvalidInput(message)
     return value
 

@@ -1,7 +1,7 @@
 """`vdsm view`, `vdsm export`: a motion as it looks."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
@@ -16,6 +16,12 @@ from vdsm_pin.cli.options import (
 from vdsm_pin.cli.robot import refuse_beside
 
 commands = family()
+
+PORT: Final = 7000
+"""Where a page is served."""
+
+WIDTH, HEIGHT, OVERVIEW = 1280, 720, "overview"
+"""How a picture is, unless asked for otherwise."""
 
 
 @commands.command(
@@ -38,7 +44,7 @@ def view(
         typer.Option(
             min=0, max=65535, metavar="NUMBER", help="Port to serve on; 0 for any."
         ),
-    ] = 7000,
+    ] = PORT,
     watch: Annotated[
         bool, typer.Option("--watch", help="Reload the page when a file changes.")
     ] = False,
@@ -50,6 +56,7 @@ def view(
     from vdsm_pin.app.visualization import serve, write_page
 
     if html is not None:
+        refuse_beside("--html", {"--watch": watch, "--port": port != PORT})
         write_page(html, problem, trajectory)
         typer.echo(f"wrote {html}")
         return
@@ -91,13 +98,13 @@ def export(
             metavar="VIEW",
             help="overview, side, top, front, tip, or a direction: 1,-1,0.5.",
         ),
-    ] = "overview",
+    ] = OVERVIEW,
     width: Annotated[
         int, typer.Option(min=64, max=4096, metavar="PIXELS", help="Of the picture.")
-    ] = 1280,
+    ] = WIDTH,
     height: Annotated[
         int, typer.Option(min=64, max=4096, metavar="PIXELS", help="Of the picture.")
-    ] = 720,
+    ] = HEIGHT,
     numbers: Annotated[
         bool, typer.Option("--numbers", help="Number the links.")
     ] = False,
@@ -114,7 +121,17 @@ def export(
     from vdsm_pin.problem.planning_problem import PlanningProblem
     from vdsm_pin.report.film import Shot, look_of
 
-    shot = Shot(look_of(look), width - width % 2, height - height % 2, numbers)
+    ending = out.suffix.lower()
+    drawn = {"--width": width != WIDTH, "--height": height != HEIGHT}
+    seen = {"--look": look != OVERVIEW, "--numbers": numbers, **drawn}
+    unused: dict[str, dict[str, object]] = {
+        ".glb": {"--moment": moment, **seen},
+        ".png": {"--seconds": seconds},
+        ".mp4": {"--moment": moment},
+    }
+    refuse_beside(ending, unused.get(ending, {}))
+    odd = 2 if ending == ".mp4" else 1  # players need even numbers
+    shot = Shot(look_of(look), width - width % odd, height - height % odd, numbers)
     asked = read_problem_or_cell(problem)
     if look == "tip" and not isinstance(asked, PlanningProblem):
         refuse_beside("a robot", {"--look tip": look})

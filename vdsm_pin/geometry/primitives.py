@@ -1,5 +1,6 @@
 """Solids of few numbers, and the convex pieces that they are made of."""
 
+import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Final, NoReturn, Self
@@ -9,6 +10,7 @@ import numpy as np
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, called, frozen, is_rotation, is_unit
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+from vdsm_pin.text import UNSEEN
 
 BOX_CORNERS: Final = frozen(
     [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
@@ -16,6 +18,7 @@ BOX_CORNERS: Final = frozen(
 """Corners of the cube [-1, 1]^3, shape (8, 3); [-]."""
 
 
+_UNSEEN: Final = re.compile(f"[{UNSEEN}]")
 _SHAPES: Final = (
     dict.fromkeys(("centre", "origin", "point", "axis", "normal", "half_size"), (3,))
     | dict.fromkeys(("radius", "half_length"), ())
@@ -43,6 +46,9 @@ class NamedSolid:
 
     def __post_init__(self) -> None:
         """Freeze the arrays, check shapes, and that numbers are what they are to be."""
+        if not isinstance(self.name, str) or _UNSEEN.search(self.name):
+            message = f"name of a solid is {self.name!r}, expected signs that are seen"
+            raise InvalidInput(message)
         for field in (*self.POINTS, *self.TURNED, *self.SIZES):
             self._freeze(field)
             value = getattr(self, field)

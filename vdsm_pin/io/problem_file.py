@@ -14,7 +14,7 @@ from vdsm_pin.io.path_schema import FilePart
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import checked
 from vdsm_pin.io.problem_schema import ProblemModel
-from vdsm_pin.io.source import check_is_file, decode, read_bytes
+from vdsm_pin.io.source import check_is_file, decode, path_of, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -109,7 +109,7 @@ def find_problem(name_or_path: str | Path) -> Path:
     name = str(name_or_path)
     if name in built_in_names():
         return _FOLDER / f"{name}.yaml"
-    path = Path(name_or_path)
+    path = path_of(name_or_path)
     try:
         check_is_file(path)
     except InvalidFile as error:

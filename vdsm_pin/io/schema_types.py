@@ -5,6 +5,8 @@ from typing import Annotated, Any, Final, TypeAlias
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from vdsm_pin.text import UNSEEN
+
 LARGEST: Final = 1e12
 """Numbers beyond this are slips, and their squares would overflow further on."""
 
@@ -30,12 +32,7 @@ Range: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Size: TypeAlias = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 FileName: TypeAlias = Annotated[str, Field(min_length=1, max_length=4096)]
 
-_UNSEEN: Final = (
-    r"\x00-\x1f\x7f-\x9f\xad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff"
-)
-"""Signs that cannot be seen, end lines or turn the direction of writing."""
-
-NAME_PATTERN: Final = f"^[^\\s=+@{_UNSEEN}-][^{_UNSEEN}]*$"
+NAME_PATTERN: Final = f"^[^\\s=+@{UNSEEN}-][^{UNSEEN}]*$"
 """Names in any alphabet. Spreadsheets take what begins with = + - @ for a formula."""
 
 Name: TypeAlias = Annotated[str, Field(pattern=NAME_PATTERN, max_length=100)]

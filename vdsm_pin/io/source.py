@@ -37,6 +37,20 @@ class Digest(Protocol):
         """The hash so far, in hexadecimal."""
 
 
+def path_of(value: Any) -> Path:
+    """The path of a file that a caller names.
+
+    Raises:
+        InvalidInput: If it is no name of a file.
+    """
+    try:
+        return Path(value)
+    except TypeError:
+        found = type(value).__name__
+        message = f"expected the name of a file, as text or Path; found {found}"
+        raise InvalidInput(message) from None
+
+
 def check_is_file(path: Path) -> None:
     """Refuse what is not a readable regular file.
 

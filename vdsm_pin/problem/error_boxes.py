@@ -223,6 +223,9 @@ class TypedErrorBox(ErrorBox):
         )
         super().__init__(**fields)
 
+    # What Python says of wrong arguments begins with this name.
+    __init__.__qualname__ = "ErrorBox"
+
 
 def in_si(
     per_metre: float,

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze
 from vdsm_pin.notebook import Summarised
@@ -56,8 +58,16 @@ class JointTrajectory(Summarised):
             expected = f"(1 or more, {len(names)})"
             message = f"positions have shape {q.shape}, expected {expected}"
             raise InvalidInput(message)
+        if not all(isinstance(name, str) for name in names):
+            message = f"joint names are {names!r}, expected text"
+            raise InvalidInput(message)
         if len(set(names)) < len(names):
             message = f"joint names are {', '.join(names)}, expected each once"
+            raise InvalidInput(message)
+        if not np.isfinite(q).all():
+            row, k = np.argwhere(~np.isfinite(q))[0]
+            found = f"joint {names[k]!r} is {q[row, k]} at waypoint {row}"
+            message = f"{found}, expected a finite number"
             raise InvalidInput(message)
         shapes = {"times": q.shape[:1], "rates": q.shape, "changes": q.shape}
         for name, shape in shapes.items():

@@ -1,6 +1,6 @@
 """Obstacles, at rest and moving, in the base frame."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
@@ -10,6 +10,7 @@ import numpy as np
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.convex import Piece
+from vdsm_pin.geometry.primitives import NamedSolid
 from vdsm_pin.geometry.solids import ConvexCover, Mesh, Solid
 from vdsm_pin.proof.tree import Kind, Tree
 from vdsm_pin.tolerances import TOLERANCES
@@ -134,8 +135,16 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Refuse duplicate names, and what distances are not proved for."""
-        object.__setattr__(self, "obstacles", tuple(self.obstacles))
+        given: Any = self.obstacles  # of callers whom no type checker told
+        if not isinstance(given, Iterable):
+            message = f"obstacles is a {type(given).__name__}, expected a list of them"
+            raise InvalidInput(message)
+        object.__setattr__(self, "obstacles", tuple(given))
         for obstacle in self.obstacles:
+            if not isinstance(obstacle, NamedSolid | ConvexCover | Moving):
+                found = type(obstacle).__name__
+                message = f"expected obstacles, as Sphere or Box; found {found}"
+                raise InvalidInput(message)
             with np.errstate(over="ignore"):  # too far, as is said
                 reach = reach_of(obstacle)
             if not reach <= TOLERANCES.scene_extent:

@@ -14,6 +14,7 @@ import numpy as np
 
 from vdsm_pin.errors import Infeasible, InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.notebook import Summarised
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import MM_PER_M
@@ -35,8 +36,8 @@ MOST: Final = 300
 """New rows that a round may push: more are pushed to different sides and lead apart."""
 
 
-@dataclass(frozen=True)
-class Repaired(Generic[V]):
+@dataclass(frozen=True, repr=False)
+class Repaired(Summarised, Generic[V]):
     """A motion that is certified, and how far it is from the one that was given.
 
     Args:
@@ -50,6 +51,15 @@ class Repaired(Generic[V]):
     verification: V
     given: IntArray
     moved: FloatArray
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """What became of the motion, then its verification."""
+        new = int((self.given < 0).sum())
+        return (
+            ("new waypoints", str(new)),
+            ("moved most", f"{self.moved.max():.6g} rad or m"),
+            *self.verification.summary(),
+        )
 
 
 @dataclass(frozen=True)

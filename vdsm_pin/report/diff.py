@@ -1,6 +1,7 @@
 """What changed between two result folders: better, worse, newly refuted."""
 
 import csv
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -36,6 +37,7 @@ _ORDER: Final = (
     "incomplete",
     "certified",
 )
+_SIGNS: Final = {True: "▼ worse ", False: "▲ better", None: "· new   "}
 THRESHOLD: Final = "changes too small for the digits shown are left out"
 """Told with every comparison."""
 
@@ -47,12 +49,13 @@ class Change:
     Args:
         problem: Folder of the problem.
         what: What differs, in words.
-        worse: Whether it got worse.
+        worse: Whether it got worse; None where a number is new, which is neither: the
+            first obstacle of a problem brings the first clearance.
     """
 
     problem: str
     what: str
-    worse: bool
+    worse: bool | None
 
 
 _MEASURES: Final[tuple[tuple[str, Text, float], ...]] = (
@@ -93,14 +96,12 @@ def diff_lines(changes: Sequence[Change]) -> list[str]:
         return [f"no difference; {THRESHOLD}"]
     ordered = sorted(changes, key=lambda change: not change.worse)
     lines = [
-        printable(
-            f"{'▼ worse ' if change.worse else '▲ better'}  "
-            f"{change.problem}: {change.what}"
-        )
+        printable(f"{_SIGNS[change.worse]}  {change.problem}: {change.what}")
         for change in ordered
     ]
-    worse = sum(change.worse for change in changes)
-    return [*lines, f"{worse} worse, {len(changes) - worse} better; {THRESHOLD}"]
+    found = Counter(change.worse for change in changes)
+    new = f", {found[None]} new" if found[None] else ""
+    return [*lines, f"{found[True]} worse, {found[False]} better{new}; {THRESHOLD}"]
 
 
 def _compare(name: str, old: BatchRow, new: BatchRow) -> list[Change]:
@@ -122,7 +123,7 @@ def _measured(
     was, now = text(first), text(second)
     what = f"{term(field)} {was} → {now}"
     if first is None or second is None:
-        return Change(name, what, second is None)
+        return Change(name, what, None if first is None else True)
     if was == now or abs(second - first) <= TOLERANCES.result_change:
         return None
     return Change(name, what, better * (second - first) < 0.0)

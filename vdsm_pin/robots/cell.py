@@ -9,6 +9,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.io.source import path_of
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
@@ -148,6 +149,10 @@ def cell_of(
     Raises:
         InvalidInput: If a file is bad or a value makes no sense.
     """
+    if not isinstance(robot, RobotFiles):
+        found = type(robot).__name__
+        message = f"expected RobotFiles, as of RobotFiles('ur5.urdf'); found {found}"
+        raise InvalidInput(message)
     read = read_robot(robot)
     required = required_clearance, required_self_clearance
     named = (*robot.files, *read.more_files)
@@ -174,7 +179,7 @@ def read_cell(path: str | Path) -> Cell:
     Raises:
         InvalidFile: If the file or one that it names breaks its contract.
     """
-    file = read_cell_file(Path(path))
+    file = read_cell_file(path_of(path))
     robot = read_robot(file.robot)
     required, required_self = file.required
     found = file.scene(robot.reach, _others(robot), read_other)

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple, TypeAlias, get_args
 
 from pydantic import Field
 
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.body_schema import MAX_PARTS
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
@@ -22,7 +22,7 @@ from vdsm_pin.io.problem_errors import checked
 from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.problem_schema import AnyProblemModel
 from vdsm_pin.io.robot_schema import CoverKind, RobotModel
-from vdsm_pin.io.source import read_text
+from vdsm_pin.io.source import path_of, read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -132,9 +132,9 @@ class RobotFiles:
     def __post_init__(self) -> None:
         """Take names of files for their paths."""
         for name in ("urdf", "srdf", "joint_limits"):
-            if (file := getattr(self, name)) is not None:
-                object.__setattr__(self, name, Path(file))
-        folders = tuple(map(Path, self.package_dirs))
+            if (file := getattr(self, name)) is not None or name == "urdf":
+                object.__setattr__(self, name, path_of(file))
+        folders = tuple(map(path_of, self.package_dirs))
         object.__setattr__(self, "package_dirs", folders)
 
     @property
@@ -274,6 +274,10 @@ def read_cell_file(path: Path) -> CellFile:
         InvalidFile: If the file breaks its contract.
     """
     document = read_yaml(read_text(path, limit=MAX_BYTES), file=path)
+    data = document.data
+    if isinstance(data, dict) and "manipulator" in data and "robot" not in data:
+        problem = "is of a snake arm, which read_problem reads; expected robot"
+        raise InvalidFile(file=path, where="manipulator", problem=problem)
     return CellFile(path, document, checked(document, CellModel))
 
 

@@ -13,7 +13,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import in_mm
+from vdsm_pin.units import proved_mm
 from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
 from vdsm_pin.verification.coal_rows import CoalRows
 from vdsm_pin.verification.protocols import AnyMotion
@@ -126,7 +126,7 @@ class Pair:
         return f"{self.own} and {self.label}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ClosestApproach:
     """The clearance bracket of one pair over one interval, with its witness.
 
@@ -160,6 +160,12 @@ class ClosestApproach:
     def moment(self) -> float:
         """When the upper bound was found, in waypoints."""
         return self.interval + self.share
+
+    def __repr__(self) -> str:
+        """The pair, what it is proved to keep and where it is nearest, in one line."""
+        kept = f"{proved_mm(self.lower)}{' or deeper' if self.deeper else ''}"
+        words = f"{self.pair}: at least {kept}, nearest at waypoint {self.moment:.6g}"
+        return f"{type(self).__name__}({words})"
 
 
 @dataclass(frozen=True)
@@ -269,7 +275,7 @@ class Verification(Summarised):
 
     def closest(self, count: int) -> tuple[ClosestApproach, ...]:
         """The nearest approaches, obstacles first, `count` of them at most."""
-        return self.approaches[:count]
+        return self.approaches[: max(count, 0)]
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Verdict, clearance, and the checks that did not pass."""
@@ -277,7 +283,7 @@ class Verification(Summarised):
         return (
             ("problem", self.problem.name),
             ("verdict", self.verdict.value),
-            ("proved clearance", in_mm(self.min_clearance)),
+            ("proved clearance", proved_mm(self.min_clearance)),
             ("waypoints", str(self.trajectory.n_samples)),
             *self._drawn(),
             *((c.name, f"{c.verdict.value} {c.where}".strip()) for c in bad),
