@@ -10,7 +10,7 @@ from made_up import trajectory
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.progress import say, shown, step, watched
-from vdsm_pin.verification.proving import prove_problem
+from vdsm_pin.verification.asked_motion import AskedMotion
 
 
 def test_what_is_said_is_shown_once_each_with_its_time(
@@ -101,9 +101,9 @@ def test_no_bar_for_what_is_soon_done_or_not_looked_at(
 
 def test_the_share_of_a_proof_grows_to_all_and_counts_what_is_far() -> None:
     problem = read_problem("paper/obs2")
-    proof = prove_problem(problem, trajectory(), ErrorBox())
-    assert proof.proving.share == 0.0
-    proof.proving.sweep(0, 64)
-    assert 0.0 < proof.proving.share < 1.0
-    proof.proving.sweep(64, proof.proving.n_intervals)
-    assert proof.proving.share == 1.0
+    proving = AskedMotion.of_arm(problem, trajectory(), ErrorBox()).proving()
+    assert proving.share == 0.0
+    proving.sweep(0, 64)
+    assert 0.0 < proving.share < 1.0
+    proving.sweep(64, proving.n_intervals)
+    assert proving.share == 1.0

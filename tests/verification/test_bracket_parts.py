@@ -358,7 +358,9 @@ def test_bounds_are_kept_where_they_fit(
         sink.keep(replace(part, pairs=pairs))
     for sent in (5, 4):
         proof: Any = SimpleNamespace(
-            least=SimpleNamespace(lower=rng.normal(size=8)), sent=sent, n_intervals=5
+            least=SimpleNamespace(lower=rng.normal(size=8)),
+            sent=sent,
+            motion=SimpleNamespace(n_intervals=5),
         )
         found = sink.proved(proof)
         assert np.array_equal(found.least, proof.least.lower)
@@ -658,9 +660,9 @@ def test_sinks_hear_of_every_interval_once(monkeypatch: pytest.MonkeyPatch) -> N
         proof = prove_clearance(asked, motion, ErrorBox(), (chunks.append,))
         monkeypatch.setattr(clearance, "CHUNK", 7)
         assert max(len(chunk.lower) for chunk in chunks) == min(most, max(1, rows - 1))
-        assert proof.sent == proof.n_intervals == max(1, rows - 1)
+        assert proof.sent == proof.motion.n_intervals == max(1, rows - 1)
         heard = [c.first_interval + k for c in chunks for k in range(len(c.lower))]
-        assert heard == [*range(proof.n_intervals)]
+        assert heard == [*range(proof.motion.n_intervals)]
         lower = np.concatenate([chunk.lower for chunk in chunks])
         assert (lower.min(axis=0) >= proof.least.lower).all()
         assert (lower.min(axis=0) <= proof.least.upper).all()

@@ -248,7 +248,7 @@ def test_no_error_is_both_certified_and_refuted(shape: str, seed: int) -> None:
     for error in (0.5 * certified, certified, 2.0 * certified):
         asked = replace(box, joint=error)
         proof = prove_clearance(problem, rows, asked)
-        found = proof.counterexamples(asked)
+        found = proof.counterexamples()
         if found and not proof.counts[:, 1].any():
             assert error > certified
             assert found[0].clearance < 0.001

@@ -20,6 +20,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.prover import verdicts_of
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.verification import clearances, counterexample
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.clearance import MOST_MEETINGS, prove_clearance
 from vdsm_pin.verification.contacts import BESIDE, MEETING
@@ -36,7 +37,6 @@ from vdsm_pin.verification.counterexample import (
 from vdsm_pin.verification.counterexamples import erring_pair
 from vdsm_pin.verification.records import Counterexample, Pair, Verdict
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
-from vdsm_pin.verification.task import arm_assembly
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
 
@@ -70,7 +70,7 @@ def checked(
 ) -> tuple[Counterexample, ...]:
     """Counterexamples, each evaluated again from its numbers alone."""
     proof = prove_clearance(problem, rows, box)
-    found = proof.counterexamples(box)
+    found = proof.counterexamples()
     for one in found:
         k, q = one.interval, rows.joints
         assert 0 <= k <= max(0, len(q) - 2)
@@ -196,7 +196,7 @@ def test_links_that_errors_bring_together_are_refuted() -> None:
     errors = bracketed(problem, rows)
     assert errors.certified > 0.0
     box = ErrorBox(joint=1.01 * errors.refuted)
-    (found,) = prove_clearance(problem, rows, box).counterexamples(box)
+    (found,) = prove_clearance(problem, rows, box).counterexamples()
     assert found.pair.other_link > found.pair.link
     assert found.clearance < 0.05
 
@@ -265,10 +265,11 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
     held: Any = SimpleNamespace(poses=list, placed=lambda k, at: (k, at))
     path: Any = SimpleNamespace(
         n_intervals=n_rows - 1,
-        split=proof.path.split,
+        split=proof.motion.path.split,
         within=lambda k, share: k + share,
     )
-    given = replace(proof, asked=held, path=path, inner=least, counts=counts)
+    asking = replace(proof.motion, asked=held, path=path)
+    given = replace(proof, motion=asking, inner=least, counts=counts)
     found = given.with_meetings()
     wanted, rest = [upper.copy(), points.copy()], counts.copy()
     moments = numbers + shares
@@ -310,9 +311,8 @@ def test_a_configuration_is_judged_by_its_proof_or_a_ball_in_both(
 ) -> None:
     rows, box = motion(4), ErrorBox(joint=0.01, base=0.003)
     problem = problem_with(ceiling(0.1))
-    held = arm_assembly(problem)
-    number = held.pairs.index(Pair(5, "ceiling"))
-    asked = erring_pair(held, rows.path.at_moments, number, box)
+    about = AskedMotion.of_arm(problem, rows, box)
+    asked = erring_pair(about, about.asked.pairs.index(Pair(5, "ceiling")))
     search, limit = Search(asked), 0.002 + 0.003
     assert search.limit == pytest.approx(limit) and asked.ball == ARM.link_radius
     points = np.array([[1.0, 2, 3], [4, 6, 8]])

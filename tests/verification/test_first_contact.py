@@ -12,7 +12,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.first_contact import arm_contacts
+from vdsm_pin.verification.contact_search import contacts_of
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
 
@@ -39,14 +39,14 @@ def wall(distance: float, required: float = 0.01) -> PlanningProblem:
 def test_the_moment_at_which_a_wall_is_too_close(n: int, distance: float) -> None:
     motion, problem = advance(np.linspace(0.0, 1.0, n)), wall(distance)
     proof = prove_clearance(problem, motion, NONE)
-    (found,) = arm_contacts(problem, motion, NONE, proof)
+    (found,) = contacts_of(problem, motion, proof.motion, proof.least)
     assert found.moment == pytest.approx((distance - 0.01) * (n - 1), abs=2e-6)
     assert (found.pair.link, found.pair.obstacle) == (8, "wall")
     assert found.clear_before
     # An obstacle that may stand nearer by 20 mm is met that much earlier.
     box = ErrorBox(obstacle=0.02)
     proof = prove_clearance(problem, motion, box)
-    (sooner,) = arm_contacts(problem, motion, box, proof)
+    (sooner,) = contacts_of(problem, motion, proof.motion, proof.least)
     assert sooner.moment <= found.moment + 1e-6
 
 
@@ -54,14 +54,14 @@ def test_a_motion_that_begins_too_close_is_so_at_once() -> None:
     for motion in (advance(np.linspace(0.1, 0.0, 4)), advance(np.array([0.1]))):
         problem = wall(0.05)
         proof = prove_clearance(problem, motion, NONE)
-        (found,) = arm_contacts(problem, motion, NONE, proof)
+        (found,) = contacts_of(problem, motion, proof.motion, proof.least)
         assert found.moment == 0.0
 
 
 def test_a_clear_motion_has_no_contact() -> None:
     motion, problem = advance(np.linspace(0.0, 0.1, 11)), wall(0.2)
     proof = prove_clearance(problem, motion, NONE)
-    assert arm_contacts(problem, motion, NONE, proof) == ()
+    assert contacts_of(problem, motion, proof.motion, proof.least) == ()
 
 
 def curling() -> tuple[PlanningProblem, Trajectory]:

@@ -18,9 +18,9 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import RENEWED
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.proving import prove_problem
 
 ARM = built_in("hrm8")
 N = ARM.n_links
@@ -88,8 +88,8 @@ def test_the_hierarchy_is_not_walked_for_every_row() -> None:
     """Ten times the rows of one motion: the walks do not multiply with them."""
     walks = []
     for n_rows in (200, 2000):
-        proof = prove_problem(problem_of(tunnel(0.55)), swaying(n_rows), ErrorBox())
-        proving = proof.proving
+        about = problem_of(tunnel(0.55)), swaying(n_rows), ErrorBox()
+        proving = AskedMotion.of_arm(*about).proving()
         proving.sweep(0, proving.n_intervals)
         walks.append(int(proving.results.tally[RENEWED]))
     assert walks[1] < 2 * walks[0]

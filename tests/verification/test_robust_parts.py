@@ -17,6 +17,7 @@ from vdsm_pin.proof.terms import UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import robust
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.robust import (
     AROUND,
     FACTORS,
@@ -224,12 +225,11 @@ def test_the_pairs_left_open_that_are_nearest_are_searched(
     )  # fmt: skip
     held = SimpleNamespace(pair=lambda k: k)
     least = SimpleNamespace(lower=best[:, LOW], lower_interval=np.ones(n, int))
-    proof = SimpleNamespace(
+    motion = SimpleNamespace(
         asked=held,
-        proving=proving,
-        told=lambda: least,
+        proving=lambda _: proving,
+        told=lambda _: least,
         knots=SimpleNamespace(interval=lambda inner: inner),
-        rows=None,
     )
 
     def search(k: int) -> Any:
@@ -237,11 +237,11 @@ def test_the_pairs_left_open_that_are_nearest_are_searched(
         found = None if errors[k] is None else SimpleNamespace(offsets=errors[k])
         return SimpleNamespace(smallest=lambda moments: found)
 
-    monkeypatch.setattr(robust, "prove_problem", lambda *_, **__: proof)
+    monkeypatch.setattr(AskedMotion, "of_arm", lambda *_: motion)
     monkeypatch.setattr(robust, "least_clearances", lambda *_: least)
     monkeypatch.setattr(robust, "in_rows", lambda *_: least)
     monkeypatch.setattr(robust, "starts", lambda *_: ())
-    monkeypatch.setattr(robust, "erring_pair", lambda *args: args[2])
+    monkeypatch.setattr(robust, "erring_pair", lambda _, k: k)
     monkeypatch.setattr(robust, "Search", search)
     told: Any = None
     found = robust._smallest(told, told, ErrorBox(), NO_LIMIT)

@@ -154,7 +154,7 @@ def test_each_step_that_may_be_long_asks_the_clock() -> None:
         "YesOrNoProof.holds",
         "_look",
         "_smallest",
-        "arm_contacts.<locals>.judge",
+        "_Judge.__call__",
         "arm_shapes.<locals>.shape",
         "check_cables",
         "check_fk",

@@ -29,10 +29,10 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene, solid_of, with_hulls
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.inside import locate_start, unlocated
-from vdsm_pin.verification.moving import whole_path
 from vdsm_pin.verification.records import ArmVerification
-from vdsm_pin.verification.task import all_pairs, arm_assembly
+from vdsm_pin.verification.task import all_pairs
 
 
 def write_certificate(
@@ -60,10 +60,9 @@ def write_certificate(
     hulls = unlocated(locate_start(problem, trajectory))
     scene = with_hulls(problem.scene, hulls)
     hulled = replace(problem, scene=scene)
-    asked, motion = arm_assembly(hulled), whole_path(hulled, trajectory)[0]
-    question = asked.question.under(asked.box(verification.errors))
-    proving = question.about(motion, Budget(until=deadline.end))
-    places = question.places[len(asked.own) :]
+    motion = AskedMotion.of_arm(hulled, trajectory, verification.errors)
+    proving = motion.proving(Budget(until=deadline.end))
+    places = motion.question.places[len(motion.asked.own) :]
     header = _header(verification, hashes, proving.task.pieces, places)
     whole = np.zeros(len(proving.task.pieces.root), np.int64)
     for place, one in zip(places, problem.scene.obstacles, strict=True):

@@ -37,6 +37,7 @@ from vdsm_pin.robots.files import HULLS
 from vdsm_pin.robots.inside import at_start, question_of_hulls, unlocated_pairs
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.moving import joined_path
 
 
@@ -64,10 +65,12 @@ def write_robot_certificate(
     check_certified(verification)
     cell, motion = verification.problem, verification.trajectory
     bodies, errors = cell.asked.bodies, verification.errors
-    whole, _ = joined_path(motion, cell.scene)
+    whole, knots = joined_path(motion, cell.scene)
     # Of a mesh without known inside the hull is proved clear, by planes for all of it.
     hulled = unlocated_pairs(at_start(cell, whole))
-    asked = question_of_hulls(cell, hulled, errors) if hulled else cell.question
+    asked = AskedMotion(cell.asked, whole, knots, errors).question
+    if hulled:
+        asked = question_of_hulls(cell, hulled, errors)
     proving, plan = asked.about(whole, Budget(until=deadline.end)), asked.plan
     pieces, n_links = proving.task.pieces, len(cell.robot.bodies)
     meshes = dict.fromkeys(cell.asked.table.one[hulled].tolist())

@@ -14,7 +14,6 @@ from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Pair, PairTable
-from vdsm_pin.proof.question import Question
 from vdsm_pin.robots.errors import check_errors, joint_errors
 from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
@@ -89,11 +88,6 @@ class Cell(AnyProblem):
             table=PairTable.of(pairs),
             column_errors=partial(joint_errors, self.robot.joints),
         )
-
-    @cached_property
-    def question(self) -> Question:
-        """All pairs under the errors, packed for any motion."""
-        return self.asked.question.under(self.asked.box(self.errors))
 
     @cached_property
     def coal(self) -> CoalShapes:

@@ -25,6 +25,7 @@ from vdsm_pin.proof.prover import answer
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.robots.cell import Cell
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceProfile
 from vdsm_pin.verification.enclosed import Inside
 from vdsm_pin.verification.first_contact import FirstContact
@@ -44,26 +45,23 @@ class Place(NamedTuple):
     point: FloatArray
 
 
-def locate_links(
-    cell: Cell, path: Path, errors: ErrorBox, budget: Budget
-) -> dict[int, Place]:
+def locate_links(cell: Cell, motion: AskedMotion, budget: Budget) -> dict[int, Place]:
     """Where each link begins as seen from each mesh that may have an inside.
 
     Args:
         cell: Robot and scene.
-        path: Of all that moves.
-        errors: Those of the proof.
+        motion: What is asked.
         budget: Of the proof off hulls.
 
     Returns:
         By the number of their pair.
     """
-    found = at_start(cell, path)
+    found = at_start(cell, motion.path)
     unknown = unlocated_pairs(found)
     if not unknown:
         return found
-    asked = question_of_hulls(cell, unknown, errors, unknown)
-    proof = answer(asked, path, budget)
+    asked = question_of_hulls(cell, unknown, motion.errors, unknown)
+    proof = answer(asked, motion.path, budget)
     clear = [unknown[k] for k in np.flatnonzero(proof.verdict == CERTIFIED)]
     outside = Location(Side.OUTSIDE)
     return found | {k: found[k]._replace(where=outside) for k in clear}

@@ -12,11 +12,10 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import Proof, answer
+from vdsm_pin.proof.prover import Proof
 from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.first_contact import robot_contacts
 from vdsm_pin.robots.inside import (
     by_mesh,
     enclosed_contacts,
@@ -26,19 +25,20 @@ from vdsm_pin.robots.inside import (
 )
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.approaches import nearest_pairs
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
 from vdsm_pin.verification.clearances import in_rows as least_in_rows
 from vdsm_pin.verification.clearances import least_clearances, profile_of, with_depths
 from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_shapes import disagreement
+from vdsm_pin.verification.contact_search import contacts_of
 from vdsm_pin.verification.contacts import MEETING
 from vdsm_pin.verification.counterexamples import find_counterexamples, in_rows
 from vdsm_pin.verification.enclosed import enclosed_least
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS_OUTSIDE, check_inside
 from vdsm_pin.verification.limits import checks_of_others
-from vdsm_pin.verification.moving import Knots, in_short_parts, joined_path
 from vdsm_pin.verification.records import Check, Verdict, Verification
 
 NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
@@ -72,26 +72,25 @@ def verify_robot(
         deadline: When to give up what is left.
         contacts: Whether to look for when bodies first and last come too close.
     """
-    robot = cell.robot
+    robot, extras = cell.robot, BestEffort()
     budget = Budget(until=deadline.end, slack=WIDTH)
-    asked = cell.asked
-    whole, knots = in_short_parts(*joined_path(path, cell.scene))
-    proof = answer(cell.question, whole, budget)
-    located = locate_links(cell, whole, cell.errors, budget)
-    named = asked.pairs
-    proved = with_depths(asked, whole, least_clearances(asked, proof))
-    coal, measured = _coal(cell, whole, proof, knots)
-    least, extras = enclosed_least(proved, pairs_inside(located)), BestEffort()
+    motion = AskedMotion.of_robot(cell.asked, path, cell.errors)
+    knots, named = motion.knots, cell.asked.pairs
+    proof = motion.proof(budget)
+    located = locate_links(cell, motion, budget)
+    proved = with_depths(motion, least_clearances(cell.asked, proof))
+    coal, measured = _coal(cell, motion, proof)
+    least = enclosed_least(proved, pairs_inside(located))
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
-    sought = asked, whole.at_moments, least, proof.lower_interval, cell.errors, deadline
+    sought = motion.in_itself, least, proof.lower_interval, deadline
     lost = extras.take("search for counterexamples", (), find_counterexamples, *sought)
     met: tuple[FirstContact, ...] = ()
     if contacts:
-        of_all = cell, path, proved, deadline
-        met = extras.take("first contact", (), robot_contacts, *of_all)
+        of_all = cell, path, motion, proved, deadline
+        met = extras.take("first contact", (), contacts_of, *of_all, balls=True)
     lost, least = in_rows(lost, knots), least_in_rows(least, knots)
     name = "proof of the motion without errors"
-    clear = bool(lost) and extras.take(name, False, _is_clear, cell, whole, deadline)
+    clear = bool(lost) and extras.take(name, False, _is_clear, cell, motion, budget)
     evidence = Evidence(
         pairs=named,
         least=least,
@@ -136,36 +135,32 @@ def _no_pair(cell: Cell) -> Check:
     return Check(LINKS, Verdict.UNDECIDED, 0, nan, needed, "m", NO_PAIR)
 
 
-def _is_clear(cell: Cell, path: Path, deadline: Deadline) -> bool:
+def _is_clear(cell: Cell, motion: AskedMotion, budget: Budget) -> bool:
     """Whether the motion is proved clear of everything, without errors."""
-    budget = Budget(until=deadline.end, slack=WIDTH)
-    located = locate_links(cell, path, ErrorBox(), budget).values()
-    if any(one.where.side is not Side.OUTSIDE for one in located):
-        return False
-    return answer(cell.asked.question, path, budget).is_certified
+    nominal = motion.under(ErrorBox())
+    located = locate_links(cell, nominal, budget).values()
+    outside = all(one.where.side is Side.OUTSIDE for one in located)
+    return outside and nominal.proof(budget).is_certified
 
 
-def _coal(
-    cell: Cell, path: Path, proof: Proof, knots: Knots
-) -> tuple[Check, FloatArray]:
+def _coal(cell: Cell, motion: AskedMotion, proof: Proof) -> tuple[Check, FloatArray]:
     """Coal's distance of each pair at its witness, which the bracket must hold.
 
     Args:
         cell: Robot and scene.
-        path: Of all that moves.
-        proof: Of the pairs along it.
-        knots: Those of the robot's own path.
+        motion: What is asked.
+        proof: Of its pairs.
 
     Returns:
         The check, and the distances, NaN where there is none, shape (n_pairs,); [m].
     """
-    asked = cell.asked
+    asked, path = cell.asked, motion.path
     table, found = asked.table, np.full(asked.table.size, nan)
     seen = np.flatnonzero(np.isfinite(proof.upper))
     poses = asked.poses(path.within(proof.interval[seen], proof.share[seen]))
     found[seen] = cell.distances(table.one[seen], table.other[seen], poses)
     off = disagreement(found, proof.lower, proof.upper)
-    moments = knots.moments(proof.interval, proof.share)
+    moments = motion.knots.moments(proof.interval, proof.share)
     measured = np.flatnonzero(~np.isnan(found))
     evidence = CoalEvidence(count=len(measured))
     if measured.size:

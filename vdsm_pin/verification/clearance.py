@@ -19,18 +19,14 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.layouts import (
-    LOW,
-    SLICES,
-    TALLY,
-)
-from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.layouts import LOW, SLICES, TALLY
 from vdsm_pin.proof.prover import RANK
-from vdsm_pin.proof.proving import dense_rows, room_for
+from vdsm_pin.proof.proving import Proving, dense_rows, room_for
+from vdsm_pin.proof.results import Dense
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.assembly import Assembly
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import (
     ClearanceChunk,
     ClearanceProfile,
@@ -46,7 +42,6 @@ from vdsm_pin.verification.clearances import (
 from vdsm_pin.verification.contacts import MEETING
 from vdsm_pin.verification.counterexamples import find_counterexamples
 from vdsm_pin.verification.moving import Knots
-from vdsm_pin.verification.proving import ProblemProof, prove_problem
 from vdsm_pin.verification.records import Counterexample, Pair
 
 CHUNK_VALUES: Final = 1_000_000
@@ -64,9 +59,7 @@ class ClearanceProof:
     """What the sweep proved.
 
     Args:
-        asked: What is held apart.
-        path: The motion of all that moves.
-        knots: Where its intervals lie in the trajectory.
+        motion: What is asked.
         counts: Intervals certified, refuted and undecided, shape (n_pairs, 3); knots of
             what carries obstacles end intervals too.
         inner: The least clearances, in intervals of the path.
@@ -78,9 +71,7 @@ class ClearanceProof:
         sent: Intervals whose brackets the sinks received: all, if there was time.
     """
 
-    asked: Assembly
-    path: Path
-    knots: Knots
+    motion: AskedMotion
     counts: IntArray
     inner: LeastClearances
     weakest: IntArray
@@ -92,32 +83,22 @@ class ClearanceProof:
     @property
     def pairs(self) -> tuple[Pair, ...]:
         """Every pair."""
-        return self.asked.pairs
-
-    @property
-    def n_intervals(self) -> int:
-        """Intervals of the trajectory."""
-        return len(self.knots.first) - 1
-
-    def rows(self, moments: FloatArray) -> FloatArray:
-        """Rows of all columns at moments in waypoints, (m,) to (m, n_columns)."""
-        return self.path.at_moments(self.knots.inner(moments))
+        return self.motion.asked.pairs
 
     @cached_property
     def least(self) -> LeastClearances:
         """The least bounds of every pair, with their witnesses."""
-        return in_rows(self.inner, self.knots)
+        return in_rows(self.inner, self.motion.knots)
 
     def counterexamples(
-        self, errors: ErrorBox, deadline: Deadline = NO_LIMIT
+        self, deadline: Deadline = NO_LIMIT
     ) -> tuple[Counterexample, ...]:
-        """Motions within the errors of the proof that miss what it left undecided.
+        """Motions within the errors that miss what the proof left undecided.
 
         Raises:
             OutOfTime: If the time is over.
         """
-        known = self.asked, self.rows, self.least, self.weakest
-        return find_counterexamples(*known, errors, deadline)
+        return find_counterexamples(self.motion, self.least, self.weakest, deadline)
 
     def with_meetings(self, deadline: Deadline = NO_LIMIT) -> "ClearanceProof":
         """The same with pairs refuted of which a ball is proved to lie in both bodies.
@@ -128,9 +109,7 @@ class ClearanceProof:
         inner, counts = self.inner, self.counts.copy()
         near = (inner.verdict == UNDECIDED) & (inner.upper <= MEETING)
         pairs = np.flatnonzero(near)[:MOST_MEETINGS]
-        span = np.array([0.0, self.path.n_intervals])
-        how = np.inf, span, deadline
-        found = with_balls(self.asked, self.path, inner, pairs, *how)
+        found = with_balls(self.motion, inner, pairs, deadline=deadline)
         lost = pairs[found.verdict[pairs] == REFUTED]
         counts[lost, REFUTED] += 1
         counts[lost, UNDECIDED] -= 1
@@ -138,14 +117,18 @@ class ClearanceProof:
 
 
 def _chunk(
-    proof: ProblemProof, first: int, last: int, least: FloatArray, pairs: IntArray
+    motion: AskedMotion,
+    dense: Dense,
+    span: tuple[int, int],
+    least: FloatArray,
+    pairs: IntArray,
 ) -> ClearanceChunk:
-    """A chunk of the trajectory's intervals from `first` to below `last`."""
-    proving, knots = proof.proving, proof.knots
-    dense, count = proving.results.dense, int(knots.first[last] - knots.first[first])
+    """A chunk of the trajectory's intervals from the first to below the last."""
+    knots, (first, last) = motion.knots, span
+    count = int(knots.first[last] - knots.first[first])
     own, other = dense.own[:count], dense.other[:count]
     # In a pair of links the sweep moves the second one against the first.
-    swapped = ~proof.asked.outer[None, :, None]
+    swapped = ~motion.asked.outer[None, :, None]
     chunk = ClearanceChunk(
         first_interval=first,
         # No interval is worse than what narrowing proved of all of them.
@@ -205,23 +188,21 @@ def prove_clearance(
     Returns:
         The proof, its least brackets narrowed unless the time ended before.
     """
-    budget = Budget(until=deadline.end)
-    proof = prove_problem(problem, trajectory, errors, budget)
-    step("proving the clearance of %d pairs", proof.question.n_pairs)
-    with watched(lambda: proof.proving.share):
-        late = not proof.proving.run()
-    results, told, sent = proof.proving.results, proof.told(in_time=not late), 0
-    n_links = problem.manipulator.n_links
+    motion = AskedMotion.of_arm(problem, trajectory, errors)
+    proving = motion.proving(Budget(until=deadline.end))
+    step("proving the clearance of %d pairs", motion.question.n_pairs)
+    with watched(lambda: proving.share):
+        late = not proving.run()
+    results, knots, sent = proving.results, motion.knots, 0
+    told, n_links = motion.told(results, in_time=not late), problem.manipulator.n_links
     if sinks:
-        sent = _send(problem, trajectory, errors, proof, sinks, reach)
+        sent = _send(problem, trajectory, motion, proving, sinks, reach)
     return ClearanceProof(
-        asked=proof.asked,
-        path=proof.path,
-        knots=proof.knots,
+        motion=motion,
         counts=frozen(results.counts, np.int64),
-        inner=least_clearances(proof.asked, told),
-        weakest=proof.knots.interval(told.lower_interval),
-        profile=profile_of(results.profile, results.stride, proof.knots, n_links),
+        inner=least_clearances(motion.asked, told),
+        weakest=knots.interval(told.lower_interval),
+        profile=profile_of(results.profile, results.stride, knots, n_links),
         slices=int(results.tally[SLICES]),
         late=late,
         sent=sent,
@@ -231,8 +212,8 @@ def prove_clearance(
 def _send(
     problem: PlanningProblem,
     trajectory: Trajectory,
-    errors: ErrorBox,
-    proof: ProblemProof,
+    motion: AskedMotion,
+    proving: Proving,
     sinks: Sequence[ClearanceSink],
     reach: float,
 ) -> int:
@@ -241,21 +222,20 @@ def _send(
     Returns:
         Number of intervals sent.
     """
-    proving = proof.proving
-    known, obstacles = proving.results, problem.scene.obstacles
-    outer, obstacle = proof.asked.outer, proof.asked.table.one - len(proof.asked.own)
+    asked, known, obstacles = motion.asked, proving.results, problem.scene.obstacles
+    outer, obstacle = asked.outer, asked.table.one - len(asked.own)
     # numpy.unique imports numpy.ma, for which every process would wait.
     near = np.flatnonzero(np.bincount(obstacle[outer & (known.best[:, LOW] <= reach)]))
     pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)
     if near.size < len(obstacles):
-        near_problem = problem.among(np.isin(np.arange(len(obstacles)), near))
-        budget = proving.budget
-        proof = prove_problem(near_problem, trajectory, errors, budget)
-        proving = proof.proving
+        some = problem.among(np.isin(np.arange(len(obstacles)), near))
+        motion = AskedMotion.of_arm(some, trajectory, motion.errors)
+        proving = motion.proving(proving.budget)
     length = CHUNK_VALUES // max(1, pairs.size) // BLOCK * BLOCK
     length = min(CHUNK, proving.n_intervals, max(BLOCK, length))
-    steps = _steps(proof.knots.first, length)
-    length = max(int(np.diff(proof.knots.first[steps]).max()), 1)
+    knots = motion.knots.first
+    steps = _steps(knots, length)
+    length = max(int(np.diff(knots[steps]).max()), 1)
     results = proving.results._replace(
         best=known.best[pairs],
         counts=np.zeros((pairs.size, 3), np.int64),
@@ -265,14 +245,13 @@ def _send(
         tally=np.zeros(TALLY, np.int64),
         dense=dense_rows(length, pairs.size),
     )
-    again = replace(proof, proving=replace(proving, results=results))
+    again, least = replace(proving, results=results), known.best[pairs, LOW]
     step("clearances of every interval")
-    with watched(lambda: again.proving.share):
+    with watched(lambda: again.share):
         for begin, end in pairwise(steps):
-            first, last = (int(proof.knots.first[k]) for k in (begin, end))
-            if not again.proving.sweep(first, last):
+            if not again.sweep(int(knots[begin]), int(knots[end])):
                 return begin
-            chunk = _chunk(again, begin, end, known.best[pairs, LOW], pairs)
+            chunk = _chunk(motion, results.dense, (begin, end), least, pairs)
             for sink in sinks:
                 sink(chunk)
     return steps[-1]

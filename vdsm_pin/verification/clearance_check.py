@@ -75,7 +75,7 @@ def check_clearance(
         pairs=proof.pairs,
         least=proof.least,
         counts=proof.counts,
-        deepest=lambda k, worst: is_deepest(worst, proof.asked.ball(k)),
+        deepest=lambda k, worst: is_deepest(worst, proof.motion.asked.ball(k)),
         counterexamples=counterexamples,
         nominal=nominal,
         contacts=contacts,

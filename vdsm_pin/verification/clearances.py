@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
 from vdsm_pin.verification.contacts import BESIDE, MEETING, common_ball
@@ -32,8 +32,7 @@ def least_clearances(asked: Assembly, proof: Proof) -> LeastClearances:
 
 
 def with_depths(
-    asked: Assembly,
-    path: Path,
+    motion: AskedMotion,
     least: LeastClearances,
     enough: float = np.inf,
     span: FloatArray | None = None,
@@ -41,37 +40,35 @@ def with_depths(
     """The same, with the depths that balls in both bodies prove.
 
     Args:
-        asked: What is held apart.
-        path: Of all that moves.
-        least: What is proved along it.
+        motion: What is asked.
+        least: What is proved of it, or of a part.
         enough: No ball deeper than this is looked for; [m].
-        span: From when to when it is, in knots of the path; None for all of it.
+        span: From when to when that is, in knots of the path; None for all of it.
     """
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
-    span = np.array([0.0, path.n_intervals]) if span is None else span
-    return with_balls(asked, path, least, np.flatnonzero(near), enough, span)
+    return with_balls(motion, least, np.flatnonzero(near), enough, span)
 
 
 def with_balls(
-    asked: Assembly,
-    path: Path,
+    motion: AskedMotion,
     least: LeastClearances,
     pairs: IntArray,
-    enough: float,
-    span: FloatArray,
+    enough: float = np.inf,
+    span: FloatArray | None = None,
     deadline: Deadline = NO_LIMIT,
 ) -> LeastClearances:
     """The same, some pairs refuted by balls in both that are deeper than is proved.
 
     Args:
-        asked: What is held apart.
-        path: Of all that moves.
-        least: What is proved along it.
+        motion: What is asked.
+        least: What is proved of it, or of a part.
         pairs: Numbers of those that are looked at.
         enough: No ball deeper than this is looked for; [m].
-        span: From when to when it is, in knots of the path, shape (2,).
+        span: As for `with_depths`.
         deadline: When to leave it at what was found.
     """
+    asked, path = motion.asked, motion.path
+    span = motion.span if span is None else span
     changed = dict[int, tuple[Any, ...]]()
     beside = min(1.0, span[1] - span[0]) * BESIDE
     for k in pairs.tolist():

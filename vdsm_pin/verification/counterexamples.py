@@ -1,15 +1,13 @@
 """What the proof under errors leaves undecided, as the search asks it."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.assembly import Assembly
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.counterexample import (
     ErringPair,
@@ -21,14 +19,10 @@ from vdsm_pin.verification.counterexample import (
 from vdsm_pin.verification.moving import Knots
 from vdsm_pin.verification.records import Counterexample
 
-Rows: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Rows of all columns at moments of a motion, (m,) to (m, n_columns)."""
 
-
-def erring_pair(
-    asked: Assembly, rows: Rows, number: int, errors: ErrorBox
-) -> ErringPair:
+def erring_pair(motion: AskedMotion, number: int) -> ErringPair:
     """What is asked of a pair, by its number."""
+    asked, errors = motion.asked, motion.errors
     pair, (one, other) = asked.pair(number), asked.sides(number)
     sizes, own = np.zeros(asked.tree.n_columns), asked.column_errors(errors)
     sizes[: own.size] = own
@@ -37,7 +31,7 @@ def erring_pair(
         tree=asked.tree,
         bodies=(asked.bodies[one], asked.bodies[other]),
         required=float(asked.table.required[number]),
-        rows=rows,
+        rows=motion.rows,
         sizes=sizes,
         grown=grown_by(errors, pair),
         n_joints=own.size,
@@ -58,21 +52,17 @@ def starts(least: LeastClearances, weakest: IntArray, k: int) -> tuple[Moment, .
 
 
 def find_counterexamples(
-    asked: Assembly,
-    rows: Rows,
+    motion: AskedMotion,
     least: LeastClearances,
     weakest: IntArray,
-    errors: ErrorBox,
     deadline: Deadline,
 ) -> tuple[Counterexample, ...]:
     """Motions within the errors that miss what the proof left undecided.
 
     Args:
-        asked: What is held apart.
-        rows: The nominal motion of all that moves.
-        least: What is proved of it under the errors, in intervals of the same moments.
+        motion: What is asked.
+        least: What is proved of it, in intervals of its trajectory.
         weakest: Of each pair the interval of its least lower bound, shape (n_pairs,).
-        errors: The errors.
         deadline: When to give up.
 
     Returns:
@@ -82,13 +72,13 @@ def find_counterexamples(
     Raises:
         OutOfTime: If the time is over.
     """
-    if errors == ErrorBox():
+    if motion.errors == ErrorBox():
         return ()
     return counterexamples(
-        asked.pairs,
+        motion.asked.pairs,
         least.verdict,
         least.lower,
-        lambda k: erring_pair(asked, rows, k, errors),
+        lambda k: erring_pair(motion, k),
         lambda k: starts(least, weakest, k),
         deadline,
     )

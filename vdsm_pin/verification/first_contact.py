@@ -3,25 +3,15 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Final, NamedTuple, Protocol, TypeAlias
+from typing import Final, Protocol, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.problem.any_problem import AnyProblem
-from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.layouts import UP
-from vdsm_pin.proof.prover import verdicts_of
-from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
-from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.protocols import AnyMotion
-from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.records import Pair
 
 STRETCH: Final = 64
@@ -161,43 +151,6 @@ def first_contacts(
             found = search.with_end(found, noted[kind])
         contacts += [] if found is None else [found.timed(motion)]
     return tuple(contacts)
-
-
-def arm_contacts(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    errors: ErrorBox,
-    proof: ClearanceProof,
-    deadline: Deadline = NO_LIMIT,
-    noted: Noted | None = None,
-) -> tuple[FirstContact, ...]:
-    """`first_contacts` of an arm's motion, of which `proof` has the whole.
-
-    Raises:
-        OutOfTime: If the time is over.
-    """
-    whole = proof.least
-    if not (whole.verdict == REFUTED).any():
-        return ()
-    budget = Budget(until=deadline.end)
-    asked = prove_problem(problem, trajectory, errors, budget)
-    # What is proved of the whole motion holds for its stretches.
-    stretches = Stretches(asked.proving, np.flatnonzero(whole.verdict != CERTIFIED))
-
-    def judge(low: float, high: float) -> Judged:
-        deadline.check()
-        span = asked.knots.inner(np.array([low, high])).tolist()
-        results, _ = stretches.over(*span)
-        return _Stretch(verdicts_of(results.counts), results.best[:, UP])
-
-    return first_contacts(problem, proof.pairs, whole, trajectory, judge, noted)
-
-
-class _Stretch(NamedTuple):
-    """What is proved of every pair of an arm over a stretch, as `Judged` has it."""
-
-    verdict: IntArray
-    upper: FloatArray
 
 
 class _Search:

@@ -165,15 +165,6 @@ def in_short_parts(path: Path, knots: Knots) -> tuple[Path, Knots]:
     return path.cut(counts), knots.cut(counts)
 
 
-def whole_path(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Path, Knots]:
-    """The joined path of an arm's trajectory and what carries the obstacles.
-
-    Raises:
-        InvalidInput: If obstacles move and the trajectory has no times.
-    """
-    return joined_path(trajectory.path, problem.scene)
-
-
 def whole_rows(
     problem: PlanningProblem, trajectory: Trajectory, moments: FloatArray
 ) -> FloatArray:

@@ -21,11 +21,11 @@ from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.terms import UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.assembly import obstacle_growth
 from vdsm_pin.verification.clearances import in_rows, least_clearances
 from vdsm_pin.verification.counterexample import Search
 from vdsm_pin.verification.counterexamples import erring_pair, starts
-from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
 
 LARGEST: Final = float(np.deg2rad(45.0))
@@ -277,16 +277,17 @@ def _smallest(
 ) -> list[float]:
     """Joint errors of counterexamples of pairs that a few slices leave undecided."""
     budget = Budget(slices=LOOKS, profile=1, until=deadline.end)
-    proof = prove_problem(problem, trajectory, errors, budget=budget)
-    proof.proving.sweep(0, proof.proving.n_intervals)
-    told, counts = proof.told(), proof.proving.results.counts
+    motion = AskedMotion.of_arm(problem, trajectory, errors)
+    proving, knots = motion.proving(budget), motion.knots
+    proving.sweep(0, proving.n_intervals)
+    told, counts = motion.told(proving.results), proving.results.counts
     among = np.flatnonzero(counts[:, UNDECIDED] > 0)
     nearest = among[np.argsort(told.lower[among], kind="stable")][:SOUGHT]
-    least = in_rows(least_clearances(proof.asked, told), proof.knots)
-    weakest = proof.knots.interval(told.lower_interval)
+    least = in_rows(least_clearances(motion.asked, told), knots)
+    weakest = knots.interval(told.lower_interval)
     searches = []
     for k in nearest.tolist():
         deadline.check()
-        search = Search(erring_pair(proof.asked, proof.rows, k, errors))
+        search = Search(erring_pair(motion, k))
         searches.append(search.smallest(starts(least, weakest, k)))
     return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]

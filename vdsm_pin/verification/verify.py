@@ -19,13 +19,11 @@ from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.approaches import closest_approaches
 from vdsm_pin.verification.best_effort import BestEffort, guarded
 from vdsm_pin.verification.brackets import ClearanceSink
-from vdsm_pin.verification.clearance import (
-    ClearanceProof,
-    prove_clearance,
-)
+from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.coal_arm import coal_reach
 from vdsm_pin.verification.coal_check import COAL, CoalLog, check_coal
+from vdsm_pin.verification.contact_search import contacts_of
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
     Inside,
@@ -34,12 +32,7 @@ from vdsm_pin.verification.enclosed import (
     enclosed_profile,
     pairs_inside,
 )
-from vdsm_pin.verification.first_contact import (
-    FirstContact,
-    Noted,
-    TooClose,
-    arm_contacts,
-)
+from vdsm_pin.verification.first_contact import FirstContact, Noted, TooClose
 from vdsm_pin.verification.inside import (
     arm_inside,
     bodies_inside,
@@ -104,10 +97,10 @@ def verify(
     counterexamples = judgement.counterexamples(proof)
     clear = bool(counterexamples) and judgement.is_nominally_clear()
     contacts = judgement.contacts(proved)
-    if sinks and proof.sent < proof.n_intervals:
+    if sinks and proof.sent < proof.motion.n_intervals:
         judgement.extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
-    near_misses = closest_approaches(problem, trajectory, proof.asked, least)
+    near_misses = closest_approaches(problem, trajectory, proof.motion.asked, least)
     log = CoalLog(near_misses, tuple(enclosed))
     clearance = check_clearance(
         problem, proof, counterexamples, contacts, deadline, nominal=clear
@@ -212,13 +205,14 @@ class _Judgement:
             reach=math.inf if inside else reach,
         )
         proof = proof.with_meetings(self.deadline)
-        too_close = noted.noted if proof.sent == proof.n_intervals else None
+        whole = proof.sent == proof.motion.n_intervals
+        too_close = noted.noted if whole else None
         return _Proved(proof, lowers.proved(proof), too_close)
 
     def counterexamples(self, proof: ClearanceProof) -> tuple[Counterexample, ...]:
         """Motions within the errors that come too close."""
-        name, asked = "search for counterexamples", (self.problem.errors, self.deadline)
-        return self.extras.take(name, (), proof.counterexamples, *asked)
+        name = "search for counterexamples"
+        return self.extras.take(name, (), proof.counterexamples, self.deadline)
 
     def is_nominally_clear(self) -> bool:
         """Whether the motion without errors is proved clear of everything."""
@@ -234,9 +228,10 @@ class _Judgement:
 
     def contacts(self, proved: _Proved) -> tuple[FirstContact, ...]:
         """When pairs first come too close."""
-        motion = self.problem, self.trajectory, self.problem.errors
-        asked = *motion, proved.proof, self.deadline, proved.too_close
-        return self.extras.take("first contact", (), arm_contacts, *asked)
+        motion, least = proved.proof.motion, proved.proof.least
+        asked = self.problem, self.trajectory, motion, least, self.deadline
+        name = "first contact"
+        return self.extras.take(name, (), contacts_of, *asked, proved.too_close)
 
     def by_coal(self, lowers: ProvedLowers, log: CoalLog) -> tuple[Check, ...]:
         """The second opinion on distances."""

@@ -13,8 +13,7 @@ from vdsm_pin.proof.packing import with_errors
 from vdsm_pin.proof.workspace import forget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.moving import whole_path
-from vdsm_pin.verification.task import arm_assembly
+from vdsm_pin.verification.asked_motion import AskedMotion
 
 BEYOND: Final = 4.0 * TOLERANCES.bracket_gap
 """Clearance asked for beyond the required one; [m].
@@ -41,10 +40,9 @@ class YesOrNoProof:
     ) -> None:
         # Nobody asks for a profile: all intervals share its one bin.
         budget = Budget(profile=1, until=deadline.end)
-        path, knots = whole_path(problem, trajectory)
-        self._asked = arm_assembly(problem)
-        self._proving = self._asked.question.about(path, budget)
-        self._first = knots.first.tolist()
+        self._motion = AskedMotion.of_arm(problem, trajectory, ErrorBox())
+        self._proving = self._motion.proving(budget)
+        self._first = self._motion.knots.first.tolist()
         self._deadline = deadline
         task = self._proving.task
         pairs = task.pairs._replace(required=task.pairs.required + BEYOND)
@@ -59,7 +57,7 @@ class YesOrNoProof:
         Raises:
             OutOfTime: If the time is over.
         """
-        box = self._asked.question.under(self._asked.box(errors)).errors
+        box = self._motion.under(errors).question.errors
         known, task = self._proving, with_errors(self._task, box)
         # Pairs that remember nothing: the answer depends on the question alone.
         forget(known.work.planes)
