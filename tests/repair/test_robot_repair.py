@@ -135,6 +135,21 @@ def test_certified_motion_stays(tmp_path: Path) -> None:
     assert not found.moved.any()
 
 
+def test_robot_without_moving_joints_stays(tmp_path: Path) -> None:
+    """Certified as it stands, or refused where it stands in the way."""
+    file = tmp_path / "still.urdf"
+    file.write_text(URDF.replace("revolute", "fixed"))
+    for x, good in ((2.0, True), (0.3, False)):
+        ball = Sphere("ball", np.array([x, 0.0, 0.0]), 0.1)
+        cell = Cell(read_robot(RobotFiles(file)), Scene((ball,)), 1e-3)
+        motion = JointTrajectory((), np.zeros((2, 0)))
+        if good:
+            assert repair_robot(cell, motion).moved.tolist() == [0.0, 0.0]
+            continue
+        with pytest.raises(Infeasible, match="waypoint 0 stays"):
+            repair_robot(cell, motion)
+
+
 def test_pinned_waypoint_in_the_way_is_named(tmp_path: Path) -> None:
     """Start, goal and pinned rows are not moved, whatever lies there."""
     x, y = tip_at(0.6, 0.3)

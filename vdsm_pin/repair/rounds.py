@@ -269,7 +269,7 @@ def repaired(
     if found.verdict is not Verdict.CERTIFIED:
         deadline.check()  # else what was not judged in time would be the reason
         raise Infeasible(_why(found))
-    moved = np.abs(motion.q - motion.origins.base).max(axis=1)
+    moved = np.abs(motion.q - motion.origins.base).max(axis=1, initial=0.0)
     return Repaired(found, motion.origins.given, moved)
 
 
