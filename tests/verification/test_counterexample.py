@@ -28,13 +28,11 @@ from vdsm_pin.verification.counterexample import (
     GRID,
     GRIDS,
     PARTS,
-    ErringPair,
     Moment,
     Search,
     grown_by,
-    moments_of,
+    starts,
 )
-from vdsm_pin.verification.counterexamples import erring_pair
 from vdsm_pin.verification.records import Counterexample, Pair, Verdict
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.verify import verify
@@ -312,21 +310,21 @@ def test_a_configuration_is_judged_by_its_proof_or_a_ball_in_both(
     rows, box = motion(4), ErrorBox(joint=0.01, base=0.003)
     problem = problem_with(ceiling(0.1))
     about = AskedMotion.of_arm(problem, rows, box)
-    asked = erring_pair(about, about.asked.pairs.index(Pair(5, "ceiling")))
-    search, limit = Search(asked), 0.002 + 0.003
-    assert search.limit == pytest.approx(limit) and asked.ball == ARM.link_radius
+    number = about.asked.pairs.index(Pair(5, "ceiling"))
+    search, limit = Search(about, number), 0.002 + 0.003
+    assert search.limit == pytest.approx(limit)
+    assert about.asked.ball(number) == ARM.link_radius
     points = np.array([[1.0, 2, 3], [4, 6, 8]])
     upper = np.nextafter(search.limit, 1.0) if not near else search.limit
     balls, centre = list[FloatArray](), np.array([7.0, 8.0, 9.0])
 
-    def common_ball(_: Any, q: FloatArray, at: FloatArray) -> tuple[float, FloatArray]:
+    def common_ball(_: Any, __: Any, at: FloatArray) -> tuple[float, FloatArray]:
         balls.append(at)
-        assert len(q) == 17
         return radius, centre
 
     told = SimpleNamespace(verdict=[verdict], upper=[upper], points=[points])
     monkeypatch.setattr(counterexample, "answer", lambda *_: told)
-    monkeypatch.setattr(ErringPair, "common_ball", common_ball)
+    monkeypatch.setattr(counterexample, "common_ball", common_ball)
     offset = np.linspace(-0.01, 0.01, 17)
     offset[3] = -0.0
     found = search._judged(Moment(2, 0.25), offset)
@@ -347,10 +345,12 @@ def test_a_configuration_is_judged_by_its_proof_or_a_ball_in_both(
     assert found.deeper == (depth <= 1e-9 - ARM.link_radius)
 
 
-def search_among(gaps: Any, **asked: Any) -> Any:
+def search_among(gaps: Any, **known: Any) -> Any:
     """A search whose clearances are those of a function of rows and its slopes."""
     search: Any = object.__new__(Search)
-    search._slopes, search.asked = gaps, SimpleNamespace(**asked)
+    search._slopes = gaps
+    for name, value in known.items():
+        setattr(search, name, value)
     return search
 
 
@@ -378,7 +378,8 @@ def test_walks_begin_at_corners_that_turn_every_second_joint() -> None:
         [0, 0, 0, 0, 0], [0, 1, 0, 1, 0], [0, -1, 0, -1, 0], [1, 0, 1, 0, 1],
         [-1, 0, -1, 0, -1],
     ]  # fmt: skip
-    begun = moments_of(Moment(7, 0.3), 4)
+    least: Any = SimpleNamespace(interval=[7], share=[0.3])
+    begun = starts(least, np.array([4]), 0)
     assert begun == (Moment(7, 0.3), *(Moment(4, k / 8.0) for k in range(9)))
 
 
@@ -391,7 +392,8 @@ def test_the_nearest_moment_of_the_interval_is_found(target: float) -> None:
         np.testing.assert_allclose(q[:, 1], q[:, 0] - 0.75, rtol=0, atol=1e-12)
         return np.abs(q[:, 0] - 0.25 - 3.0 - target), None
 
-    search = search_among(gaps, rows=lambda m: np.stack([m, m], axis=1))
+    rows = SimpleNamespace(rows=lambda m: np.stack([m, m], axis=1))
+    search = search_among(gaps, motion=rows)
     for off in (-0.12, 0.0, 0.12):
         share = min(max(target, 0.0), 1.0) + off
         begun = Moment(3, min(max(share, 0.0), 1.0))

@@ -232,7 +232,7 @@ def test_the_pairs_left_open_that_are_nearest_are_searched(
         knots=SimpleNamespace(interval=lambda inner: inner),
     )
 
-    def search(k: int) -> Any:
+    def search(_: Any, k: int) -> Any:
         asked.append(k)
         found = None if errors[k] is None else SimpleNamespace(offsets=errors[k])
         return SimpleNamespace(smallest=lambda moments: found)
@@ -241,7 +241,6 @@ def test_the_pairs_left_open_that_are_nearest_are_searched(
     monkeypatch.setattr(robust, "least_clearances", lambda *_: least)
     monkeypatch.setattr(robust, "in_rows", lambda *_: least)
     monkeypatch.setattr(robust, "starts", lambda *_: ())
-    monkeypatch.setattr(robust, "erring_pair", lambda _, k: k)
     monkeypatch.setattr(robust, "Search", search)
     told: Any = None
     found = robust._smallest(told, told, ErrorBox(), NO_LIMIT)

@@ -158,7 +158,7 @@ def test_each_step_that_may_be_long_asks_the_clock() -> None:
         "arm_shapes.<locals>.shape",
         "check_cables",
         "check_fk",
-        "counterexamples",
+        "find_counterexamples",
     }
 
 

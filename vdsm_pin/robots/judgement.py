@@ -34,7 +34,7 @@ from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_shapes import disagreement
 from vdsm_pin.verification.contact_search import contacts_of
 from vdsm_pin.verification.contacts import MEETING
-from vdsm_pin.verification.counterexamples import find_counterexamples, in_rows
+from vdsm_pin.verification.counterexample import find_counterexamples, in_rows
 from vdsm_pin.verification.enclosed import enclosed_least
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS_OUTSIDE, check_inside

@@ -40,7 +40,7 @@ from vdsm_pin.verification.clearances import (
     with_balls,
 )
 from vdsm_pin.verification.contacts import MEETING
-from vdsm_pin.verification.counterexamples import find_counterexamples
+from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.moving import Knots
 from vdsm_pin.verification.records import Counterexample, Pair
 

@@ -7,24 +7,25 @@ distance. What it finds is judged like any motion of one row, so that nothing is
 without two witness points.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.bodies import Pair as ProofPair
+from vdsm_pin.proof.bodies import PairTable
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import answer
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
-from vdsm_pin.proof.tree import Tree
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.contacts import Placed, common_ball
+from vdsm_pin.verification.asked_motion import AskedMotion
+from vdsm_pin.verification.brackets import LeastClearances
+from vdsm_pin.verification.contacts import common_ball
+from vdsm_pin.verification.moving import Knots
 from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import Counterexample, Pair, is_deepest
 
@@ -61,42 +62,6 @@ class Moment:
     share: float
 
 
-@dataclass(frozen=True)
-class ErringPair:
-    """Whether two bodies of a tree come too near within an error box.
-
-    Args:
-        pair: Their names.
-        tree: The joints.
-        bodies: Those two, in the order of their names.
-        required: Their least clearance; [m].
-        rows: Rows of all columns at moments in waypoints, (m,) to (m, n_columns).
-        sizes: Largest errors of the columns, shape (n_columns,); [m], [rad].
-        grown: By how much the partner may come nearer besides; turns of base or
-            obstacle are left out: what is found holds without them; [m].
-        n_joints: Columns that are told; others are of what moves beside.
-        ball: Radius of what the first body is grown by, as deep as is measured; [m].
-    """
-
-    pair: Pair
-    tree: Tree
-    bodies: tuple[Body, Body]
-    required: float
-    rows: Callable[[FloatArray], FloatArray]
-    sizes: FloatArray
-    grown: float
-    n_joints: int
-    ball: float = 0.0
-
-    def common_ball(
-        self, q: FloatArray, middle: FloatArray
-    ) -> tuple[float, FloatArray]:
-        """A ball in both bodies at a row of q, looked for about a point, as proved."""
-        (poses,) = self.tree.poses(q[None])
-        one, other = (Placed(x.pieces, poses[x.frame]) for x in self.bodies)
-        return common_ball(one, other, middle)
-
-
 def grown_by(errors: ErrorBox, pair: Pair) -> float:
     """By how much errors that do not turn bring a partner nearer; [m]."""
     if not pair.obstacle:
@@ -105,17 +70,26 @@ def grown_by(errors: ErrorBox, pair: Pair) -> float:
 
 
 class Search:
-    """Looks for counterexamples of one pair.
+    """Looks for errors under which two bodies come too near.
 
     Args:
-        asked: The pair and the errors.
+        motion: What is asked.
+        number: Of the pair.
     """
 
-    def __init__(self, asked: ErringPair) -> None:
-        self.asked, self.limit = asked, asked.required + asked.grown
+    def __init__(self, motion: AskedMotion, number: int) -> None:
+        asked, self.motion, self.number = motion.asked, motion, number
+        self.required = float(asked.table.required[number])
+        # Turns of base or obstacle are left out: what is found holds without them.
+        self.grown = grown_by(motion.errors, asked.pair(number))
+        self.limit = self.required + self.grown
+        own = asked.column_errors(motion.errors)
+        self.n_joints, self.sizes = own.size, np.zeros(asked.tree.n_columns)
+        self.sizes[: own.size] = own  # others are of what moves beside
+        bodies = [asked.bodies[k] for k in asked.sides(number)]
         table = PairTable.of([ProofPair(0, 1, self.limit)])
-        self.question = Question.of(asked.tree, asked.bodies, table)
-        self.task = self.question.about(Path(asked.rows(np.zeros(1)))).task
+        self.question = Question.of(asked.tree, bodies, table)
+        self.task = self.question.about(Path(motion.rows(np.zeros(1)))).task
 
     def find(self, moments: tuple[Moment, ...]) -> Counterexample | None:
         """A configuration within the box that misses the required clearance.
@@ -143,7 +117,7 @@ class Search:
 
     def _nearest(self, moments: tuple[Moment, ...]) -> tuple[Moment, FloatArray]:
         """The nearest configuration found within the box: moment and offsets."""
-        corners, scale = self._first_corners(), INSIDE * self.asked.sizes
+        corners, scale = self._first_corners(), INSIDE * self.sizes
         at = [(moment, corner) for moment in moments for corner in corners]
         q = np.array([self._joints(moment) for moment, _ in at])
         moved = self._walk(q, np.array([corner for _, corner in at]) * scale, scale)
@@ -153,13 +127,12 @@ class Search:
 
     def _joints(self, moment: Moment) -> FloatArray:
         """Nominal values of all columns, shape (n_columns,)."""
-        return np.asarray(
-            self.asked.rows(np.array([moment.interval + moment.share]))[0]
-        )
+        at = np.array([moment.interval + moment.share])
+        return np.asarray(self.motion.rows(at)[0])
 
     def _first_corners(self) -> FloatArray:
         """Corners to start from: none, and every second joint to one side."""
-        odd = np.arange(len(self.asked.sizes)) % 2
+        odd = np.arange(len(self.sizes)) % 2
         return np.array([0.0 * odd, odd, -odd, 1 - odd, odd - 1])
 
     def _gaps(self, q: FloatArray) -> FloatArray:
@@ -196,61 +169,61 @@ class Search:
         step, share = float(SHARES[1]) / GRID, moment.share
         for _ in range(GRIDS):
             shares = (share + step * AROUND).clip(0.0, 1.0)
-            gaps = self._gaps(self.asked.rows(moment.interval + shares) + offset)
+            gaps = self._gaps(self.motion.rows(moment.interval + shares) + offset)
             share, step = float(shares[np.argmin(gaps)]), step / GRID
         return Moment(moment.interval, share), offset
 
     def _judged(self, moment: Moment, offset: FloatArray) -> Counterexample | None:
         """What the clearance proof says of one configuration."""
-        asked, q = self.asked, self._joints(moment) + offset
+        asked, q = self.motion.asked, self._joints(moment) + offset
         proof = answer(self.question, Path(q[None]))
         upper, points = float(proof.upper[0]), proof.points[0]
         refuted = proof.verdict[0] == REFUTED
         if not refuted and upper <= self.limit:
-            radius, centre = asked.common_ball(q, points.mean(axis=0))
+            (poses,) = asked.tree.poses(q[None])
+            both = asked.placed(self.number, poses)
+            radius, centre = common_ball(*both, points.mean(axis=0))
             upper, points, refuted = -radius, np.array([centre, centre]), radius > 0.0
         if not refuted:
             return None
         return Counterexample(
             interval=moment.interval,
             share=moment.share,
-            pair=asked.pair,
-            joints=frozen(q[: asked.n_joints]),
-            offsets=frozen(offset[: asked.n_joints] + 0.0),  # no -0
-            clearance=upper - asked.grown,
-            required=asked.required,
+            pair=asked.pair(self.number),
+            joints=frozen(q[: self.n_joints]),
+            offsets=frozen(offset[: self.n_joints] + 0.0),  # no -0
+            clearance=upper - self.grown,
+            required=self.required,
             link_point=frozen(points[0]),
             other_point=frozen(points[1]),
-            deeper=is_deepest(upper, asked.ball),
+            deeper=is_deepest(upper, asked.ball(self.number)),
         )
 
 
-def moments_of(nearest: Moment, weakest: int) -> tuple[Moment, ...]:
-    """Where a search starts: the least upper bound, and along an interval.
+def starts(least: LeastClearances, weakest: IntArray, k: int) -> tuple[Moment, ...]:
+    """Where the search of a pair starts: nearest so far, and where least is proved.
 
     Args:
-        nearest: When the pair comes nearest, as far as is known.
-        weakest: Its interval of the least lower bound.
+        least: What is proved.
+        weakest: Of each pair the interval of its least lower bound, shape (n_pairs,).
+        k: The pair.
     """
-    return (nearest, *(Moment(weakest, float(share)) for share in SHARES))
+    nearest = Moment(int(least.interval[k]), float(least.share[k]))
+    return (nearest, *(Moment(int(weakest[k]), float(share)) for share in SHARES))
 
 
-def counterexamples(
-    pairs: Sequence[Pair],
-    verdict: IntArray,
-    lower: FloatArray,
-    question: Callable[[int], ErringPair],
-    moments: Callable[[int], tuple[Moment, ...]],
+def find_counterexamples(
+    motion: AskedMotion,
+    least: LeastClearances,
+    weakest: IntArray,
     deadline: Deadline,
 ) -> tuple[Counterexample, ...]:
-    """Motions within an error box that miss what its proof left undecided.
+    """Motions within the errors that miss what the proof left undecided.
 
     Args:
-        pairs: Every pair of the motion.
-        verdict: CERTIFIED, REFUTED or UNDECIDED, shape (n_pairs,).
-        lower: Least proved clearances, shape (n_pairs,); [m].
-        question: Of the pair of a number.
-        moments: Where to start with it.
+        motion: What is asked.
+        least: What is proved of it, in intervals of its trajectory.
+        weakest: Of each pair the interval of its least lower bound, shape (n_pairs,).
         deadline: When to give up.
 
     Returns:
@@ -260,15 +233,27 @@ def counterexamples(
     Raises:
         OutOfTime: If the time is over.
     """
-    outer = np.array([bool(pair.obstacle) for pair in pairs], dtype=bool)
-    found = []
-    for mine in (outer, ~outer):
+    outer, verdict, found = motion.asked.outer, least.verdict, list[Counterexample]()
+    for mine in () if motion.errors == ErrorBox() else (outer, ~outer):
         if (verdict[mine] == REFUTED).any():
             continue
         among = np.flatnonzero(mine & (verdict == UNDECIDED))
-        for k in among[np.argsort(lower[among], kind="stable")][:PAIRS]:
+        order = np.argsort(least.lower[among], kind="stable")
+        for k in among[order][:PAIRS].tolist():
             deadline.check()
-            if one := Search(question(k)).find(moments(k)):
+            if one := Search(motion, k).find(starts(least, weakest, k)):
                 found.append(one)
                 break
     return tuple(found)
+
+
+def in_rows(
+    found: tuple[Counterexample, ...], knots: Knots
+) -> tuple[Counterexample, ...]:
+    """The same, their moments in intervals of the trajectory."""
+    if knots.are_rows:
+        return found
+    inner = np.array([one.interval for one in found], np.int64)
+    shares = knots.share(inner, np.array([one.share for one in found]))
+    rows = zip(found, knots.interval(inner).tolist(), shares.tolist(), strict=True)
+    return tuple(replace(one, interval=k, share=share) for one, k, share in rows)

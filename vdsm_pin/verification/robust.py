@@ -24,8 +24,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.assembly import obstacle_growth
 from vdsm_pin.verification.clearances import in_rows, least_clearances
-from vdsm_pin.verification.counterexample import Search
-from vdsm_pin.verification.counterexamples import erring_pair, starts
+from vdsm_pin.verification.counterexample import Search, starts
 from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
 
 LARGEST: Final = float(np.deg2rad(45.0))
@@ -288,6 +287,5 @@ def _smallest(
     searches = []
     for k in nearest.tolist():
         deadline.check()
-        search = Search(erring_pair(motion, k))
-        searches.append(search.smallest(starts(least, weakest, k)))
+        searches.append(Search(motion, k).smallest(starts(least, weakest, k)))
     return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]
