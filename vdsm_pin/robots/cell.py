@@ -13,7 +13,7 @@ from vdsm_pin.io.source import path_of
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.proof.bodies import Pair, PairTable
+from vdsm_pin.proof.bodies import PairTable
 from vdsm_pin.robots.errors import check_errors, joint_errors
 from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
@@ -73,11 +73,14 @@ class Cell(AnyProblem):
     def asked(self) -> Assembly:
         """What of it is held apart."""
         bodies, n = self.robot.bodies, len(self.robot.bodies)
-        outer = range(n, n + len(self.scene.obstacles))
-        required = self.required_clearance
-        pairs = [Pair(k, b, required) for k in outer for b in range(n)]
-        own = self.required_self_clearance
-        pairs += [Pair(i, k, own) for i, k in self.robot.held]
+        m, held = len(self.scene.obstacles), self.robot.held
+        near, far = np.array(held, np.int64).reshape(-1, 2).T
+        required = [self.required_clearance, self.required_self_clearance]
+        table = PairTable(
+            frozen(np.append(np.repeat(np.arange(n, n + m), n), near), np.int64),
+            frozen(np.append(np.tile(np.arange(n), m), far), np.int64),
+            frozen(np.repeat(required, [m * n, len(held)])),
+        )
         return Assembly(
             own_tree=self.robot.tree,
             own=bodies,
@@ -85,7 +88,7 @@ class Cell(AnyProblem):
             names=[body.name for body in bodies],
             balls=[0.0] * n,
             scene=self.scene,
-            table=PairTable.of(pairs),
+            table=table,
             column_errors=partial(joint_errors, self.robot.joints),
         )
 
@@ -97,19 +100,24 @@ class Cell(AnyProblem):
         return CoalShapes(frames, [*link_shapes(self.robot), *things])
 
     def distances(
-        self, one: IntArray, other: IntArray, poses: FloatArray
+        self,
+        one: IntArray,
+        other: IntArray,
+        poses: FloatArray,
+        row: IntArray | None = None,
     ) -> FloatArray:
         """Coal's of pairs of bodies, shape (m,); [m]. NaN for none.
 
         Args:
             one: Their first bodies, shape (m,).
             other: The second ones, shape (m,).
-            poses: Of all frames, for each pair, shape (m, n_frames, 4, 4); [m].
+            poses: Of all frames at some rows, shape (n_rows, n_frames, 4, 4); [m].
+            row: That of each pair, shape (m,); None where each has its own.
         """
         # Seen from the obstacle, the first body of its pairs: a cloud has no pose.
         outer = one >= len(self.robot.bodies)
         sides = np.where(outer, other, one), np.where(outer, one, other)
-        placed = Sides(np.arange(len(poses)), *sides)
+        placed = Sides(np.arange(len(poses)) if row is None else row, *sides)
         return self.coal.distances(poses[:, :, :3], placed).distance
 
     def summary(self) -> tuple[tuple[str, str], ...]:

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, first_equal
 from vdsm_pin.geometry.winding import Side
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
@@ -157,8 +157,10 @@ def _coal(cell: Cell, motion: AskedMotion, proof: Proof) -> tuple[Check, FloatAr
     asked, path = cell.asked, motion.path
     table, found = asked.table, np.full(asked.table.size, nan)
     seen = np.flatnonzero(np.isfinite(proof.upper))
-    poses = asked.poses(path.within(proof.interval[seen], proof.share[seen]))
-    found[seen] = cell.distances(table.one[seen], table.other[seen], poses)
+    when = np.stack([proof.interval[seen], proof.share[seen]], axis=1)
+    first, row = first_equal(when)
+    poses = asked.poses(path.within(proof.interval[seen[first]], when[first, 1]))
+    found[seen] = cell.distances(table.one[seen], table.other[seen], poses, row)
     off = disagreement(found, proof.lower, proof.upper)
     moments = motion.knots.moments(proof.interval, proof.share)
     measured = np.flatnonzero(~np.isnan(found))

@@ -2,7 +2,7 @@
 
 What Coal 3.0 needs to be believed (each point has a test): a GJK tolerance of 1e-8,
 since 1e-6 reads 1.5e-6 m too far and 1e-12 returns NaN; the default EPA tolerance; a
-fresh result for every call, since a used one keeps its smaller value; and below zero
+cleared result for every call, since a used one keeps its smaller value; and below zero
 only the sign. A mesh is its surface to Coal: whoever is inside one is told the distance
 to its skin, so that the sign of a body in a mesh has to come from elsewhere.
 """
@@ -92,7 +92,7 @@ class CoalCloud:
     def measured(self, request: Any, geometry: Any, pose: Any) -> Measured:
         """What Coal says of the nearest body; arguments are those of `measure`."""
         geometry.computeLocalAABB()
-        box, best = geometry.aabb_local, NOTHING
+        box, best, result = geometry.aabb_local, NOTHING, new_result()
         bounds = _gaps(box, pose, self._middle) - self._reach
         for k in np.argsort(bounds):
             if bounds[k] > max(best.distance, 0.0):
@@ -103,7 +103,7 @@ class CoalCloud:
                 if each[i] > max(best.distance, 0.0):
                     break
                 body = placed(self._shape, group[i], self._rotation)
-                found = _nearest(request, geometry, pose, (body,))
+                found = _nearest(request, geometry, pose, (body,), result)
                 best = min(best, found, key=lambda one: one.distance)
         return best
 
@@ -207,7 +207,20 @@ def distance_request() -> Any:
     return request
 
 
-def measure(request: Any, geometry: Any, pose: Any, bodies: CoalObstacle) -> Measured:
+def new_result() -> Any:
+    """Room for one answer of Coal after the other."""
+    import coal
+
+    return coal.DistanceResult()
+
+
+def measure(
+    request: Any,
+    geometry: Any,
+    pose: Any,
+    bodies: CoalObstacle,
+    result: Any = None,
+) -> Measured:
     """Distance between one body and the nearest part of an obstacle.
 
     Args:
@@ -215,23 +228,24 @@ def measure(request: Any, geometry: Any, pose: Any, bodies: CoalObstacle) -> Mea
         geometry: A coal.CollisionGeometry.
         pose: Its coal.Transform3s.
         bodies: The obstacle.
+        result: From `new_result`, for those who measure much; None for a new one.
 
     Returns:
         The nearest part's answer; one unusable answer makes the whole unusable.
     """
     if isinstance(bodies, CoalCloud):
         return bodies.measured(request, geometry, pose)
-    return _nearest(request, geometry, pose, bodies)
+    return _nearest(request, geometry, pose, bodies, result or new_result())
 
 
 def _nearest(
-    request: Any, geometry: Any, pose: Any, bodies: Iterable[CoalBody]
+    request: Any, geometry: Any, pose: Any, bodies: Iterable[CoalBody], result: Any
 ) -> Measured:
     import coal
 
     best = NOTHING
     for body in bodies:
-        result = coal.DistanceResult()
+        result.clear()
         distance = coal.distance(
             geometry, pose, body.geometry, body.pose, request, result
         )

@@ -4,7 +4,7 @@ Whoever asks has the frames' poses, from Pinocchio where it can.
 """
 
 from collections.abc import Sequence
-from math import isnan
+from math import nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,8 +13,10 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.verification.coal_bodies import (
     CoalCloud,
     CoalObstacle,
+    Measured,
     distance_request,
     measure,
+    new_result,
 )
 
 
@@ -116,24 +118,29 @@ class CoalShapes:
         """
         import coal
 
-        count, first = len(sides.row), self._parts.first
-        found = Distances(np.full(count, np.nan), *np.full((2, count, 3), np.nan))
+        first, nothing = self._parts.first, Measured(nan, *np.full((2, 3), nan))
+        least = [nothing] * len(sides.row)
         # Every part of every first body, pair by pair.
         n_parts = first[sides.one + 1] - first[sides.one]
-        pair = np.repeat(np.arange(count), n_parts)
+        pair = np.repeat(np.arange(len(least)), n_parts)
         within = np.arange(pair.size) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
         part = first[sides.one][pair] + within
         places = self._places(poses, Sides(*(side[pair] for side in sides)), part)
-        request, (distance, near, far) = distance_request(), found
-        shapes, partners = self._parts.shapes, [self._bodies[k] for k in sides.other]
-        calls = zip(pair.tolist(), part.tolist(), *places, strict=True)
-        for k, number, turn, shift in calls:
-            if (partner := partners[k]) is not None:
-                pose = coal.Transform3s(turn, shift)
-                answer = measure(request, shapes[number], pose, partner)
-                if isnan(distance[k]) or answer.distance < distance[k]:
-                    distance[k], near[k], far[k] = answer
-        return found
+        request, pose, result = distance_request(), coal.Transform3s(), new_result()
+        shapes = [self._parts.shapes[k] for k in part.tolist()]
+        partners = [self._bodies[k] for k in sides.other[pair].tolist()]
+        calls = zip(pair.tolist(), shapes, partners, *places, strict=True)
+        for k, shape, partner, turn, shift in calls:
+            if partner is not None:
+                pose.setTransform(turn, shift)
+                answer = measure(request, shape, pose, partner, result)
+                if not answer.distance >= least[k].distance:
+                    least[k] = answer
+        points = np.zeros((2, len(least), 3))
+        if least:
+            points[0] = np.concatenate([one.near for one in least]).reshape(-1, 3)
+            points[1] = np.concatenate([one.far for one in least]).reshape(-1, 3)
+        return Distances(np.array([one.distance for one in least]), *points)
 
     def _places(
         self, poses: FloatArray, sides: Sides, part: IntArray
