@@ -231,6 +231,23 @@ def first_groups(pieces: PackedPieces, count: int) -> PackedPieces:
     )
 
 
+def joined_pieces(first: PackedPieces, then: PackedPieces) -> PackedPieces:
+    """Packed obstacles, then those of others; what counts in them counts on."""
+    n_pieces, n_points = len(first.kind), len(first.points)
+    shifts = {"root": len(first.node_range), "node_range": n_pieces}
+    found = {
+        name: np.concatenate([one, other + shifts.get(name, 0)])
+        for name, one, other in zip(first._fields, first, then, strict=True)
+    }
+    right = then.node_right
+    right = np.where(right < 0, right, right + len(first.node_range))
+    return PackedPieces(**found)._replace(
+        first_point=np.append(first.first_point, then.first_point[1:] + n_points),
+        first_piece=np.append(first.first_piece, then.first_piece[1:] + n_pieces),
+        node_right=np.append(first.node_right, right),
+    )
+
+
 def pack_pieces(obstacles: Sequence[Sequence[Piece]]) -> PackedPieces:
     """Pack the pieces of every obstacle, in the given order.
 

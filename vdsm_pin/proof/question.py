@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import IntArray
-from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.pieces import PackedPieces, joined_pieces, pack_pieces
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.error_box import ErrorBox
@@ -17,6 +19,9 @@ from vdsm_pin.proof.proving import Proving, new_proving
 from vdsm_pin.proof.rough import with_rough
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.tree import Tree, added_up
+
+KEPT: Final = 2
+"""Robots whose packed pieces are kept."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,9 @@ class Question:
         rough = with_rough(plan.bodies, plan.pairs)
         number, every = plan.number[rough.original], rough.bodies
         if packed is None or len(every) > len(bodies):
-            packed = pack_pieces([body.pieces for body in every])
+            n = plan.n_obstacles
+            resting = pack_pieces([body.pieces for body in every[:n]])
+            packed = joined_pieces(resting, _moving_pieces(tuple(every[n:])))
         count = 1 if columns is None else int(columns.max(initial=0)) + 1
         columns = None if columns is None else columns[number]
         extent, rules = _extent(tree, packed), Budget().rules(0.0)
@@ -106,6 +113,12 @@ class Question:
         task = for_motion(self.task, tree, reach, rules)
         asked = with_errors(task, self.errors), path.packed(), self.n_columns
         return new_proving(*asked, self.plan.n_obstacles, budget)
+
+
+@lru_cache(maxsize=KEPT)
+def _moving_pieces(bodies: tuple[Body, ...]) -> PackedPieces:
+    """Packed pieces of a robot's bodies, for its next scene."""
+    return pack_pieces([body.pieces for body in bodies])
 
 
 def _extent(tree: Tree, pieces: PackedPieces) -> float:

@@ -93,7 +93,10 @@ class Assembly:
 
     def pair(self, number: int) -> Pair:
         """One pair as the reports name it, without naming all of a million."""
-        one, other = self.sides(number)
+        return self._pair(*self.sides(number))
+
+    def _pair(self, one: int, other: int) -> Pair:
+        """The pair of two bodies, that of a link first."""
         link, name = self.links[one], self.names[one]
         if other >= len(self.own):
             obstacle = self.scene.obstacles[other - len(self.own)].name
@@ -103,7 +106,9 @@ class Assembly:
     @cached_property
     def pairs(self) -> tuple[Pair, ...]:
         """Every pair as the reports name it."""
-        return tuple(map(self.pair, range(self.table.size)))
+        sides = self.table.one, self.table.other
+        own, others = np.where(self.outer, sides[::-1], sides)
+        return tuple(map(self._pair, own.tolist(), others.tolist()))
 
     def placed(self, number: int, poses: FloatArray) -> tuple[Placed, Placed]:
         """Both bodies of a pair where all frames stand, poses (n_frames, 4, 4); [m]."""
