@@ -107,14 +107,18 @@ def changes(root: Path, module: str) -> list[Change]:
         if not hasattr(node, "lineno"):
             continue
         more = [placed[id(node)]] if id(node) in placed else []
+        before = ast.unparse(node)
         for changed in [*swapped(node), *more]:
+            after = ast.unparse(ast.fix_missing_locations(changed))
+            if before == after:  # two arguments that are alike
+                continue
             found.append(
                 Change(
                     module=module,
                     line=node.lineno,
                     function=function,
-                    before=ast.unparse(node),
-                    after=ast.unparse(ast.fix_missing_locations(changed)),
+                    before=before,
+                    after=after,
                     content=_with(source, node, changed),
                     lines=effects.get(id(node), (node.lineno,)),
                     names=names.get(id(node), ()),

@@ -63,6 +63,7 @@ def one(known, name, *more):
             continue
         known.rows[row] = name
         known.put(name, row, strict=True)
+        known.put(name, name)
         zip(known, row, strict=True)
     while known.open:
         raise ValueError(name)
@@ -85,6 +86,7 @@ def test_statements_conditions_and_arguments_are_changed(tmp_path: Path) -> None
         "known.rows[row] = name -> pass",
         "known.put(name, row, strict=True) -> pass",
         "known.put(name, row, strict=True) -> known.put(row, name, strict=True)",
+        "known.put(name, name) -> pass",  # and not the two in each other's place
         "True -> False",
         "zip(known, row, strict=True) -> pass",
         "zip(known, row, strict=True) -> zip(row, known, strict=True)",
