@@ -339,3 +339,21 @@ def test_obstacles_on_a_carrier_follow_its_own_frames() -> None:
     pose = Interval(tree, path.controls(0)).pose(0.5)
     places = [[*map(float, pose[k][0].entries())] for k in (1, *frames[1:])]
     assert places == [[0.0, 0.0, 7.5], [1.5, 0.0, 0.0], [1.5, 2.5, 0.0]]
+
+
+@pytest.mark.parametrize("own_times", [True, False])
+@pytest.mark.parametrize("other_times", [True, False])
+def test_rows_beside_what_moves_have_times(own_times: bool, other_times: bool) -> None:
+    place, times, knots = np.eye(4), np.arange(2.0), np.zeros((2, 1))
+    other: Any = Branch(knots, times if other_times else None)
+    joint = trees.Joint(0, Kind.PRISMATIC, trees.X, place, 0)
+    carrier = Carrier(trees.Tree((joint,)), other)
+    ball = Sphere("ball", np.zeros(3), 0.1)
+    own = Branch(knots, times if own_times else None)
+    rail = Joint(0, SLIDES, (0, 0, 1), place, (0, 1.0, 0.0))
+    beside(own, [rail], [ball])  # nothing moves: rows need no times
+    if own_times and other_times:
+        beside(own, [rail], [ball, Moving(ball, carrier, 1)])
+    else:
+        with pytest.raises(Rejected, match="rows beside what moves have no times"):
+            beside(own, [rail], [ball, Moving(ball, carrier, 1)])

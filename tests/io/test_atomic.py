@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from vdsm_pin.errors import InvalidFile
-from vdsm_pin.io.atomic import atomic_path, write_text
+from vdsm_pin.errors import CannotWrite, InvalidFile
+from vdsm_pin.io.atomic import atomic_path, check_replaceable, write_text, writing
 
 
 def test_the_file_takes_its_name_when_the_block_ends(tmp_path: Path) -> None:
@@ -22,6 +22,23 @@ def test_the_file_takes_its_name_when_the_block_ends(tmp_path: Path) -> None:
         assert not path.exists()
     assert path.read_text() == "whole"
     assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_pipe_or_a_folder_is_not_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path, why in ((tmp_path / "pipe", "no"), (tmp_path, "is a folder")):
+        with pytest.raises(InvalidFile, match=why):
+            check_replaceable(path)
+    (tmp_path / "a.txt").write_text("old")
+    for name in ("a.txt", "new.txt"):
+        check_replaceable(tmp_path / name)
+
+
+def test_of_a_closed_pipe_nothing_is_told_of_what_is_written() -> None:
+    with pytest.raises(BrokenPipeError), writing("-"):
+        raise BrokenPipeError
+    with pytest.raises(CannotWrite, match="the disc is full"), writing("a.txt"):
+        raise OSError(28, "the disc is full")
 
 
 def test_a_failing_block_leaves_what_was_there(tmp_path: Path) -> None:

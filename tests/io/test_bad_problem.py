@@ -384,6 +384,44 @@ def test_what_is_not_stated_of_errors_is_none(tmp_path: Path) -> None:
         assert read_problem(tmp_path / "p.yaml").errors == expected
 
 
+@pytest.mark.parametrize("count", [0, 7, 9])
+def test_errors_of_joints_are_as_many_as_joints(tmp_path: Path, count: int) -> None:
+    text = edited(OBS1, ("errors",), {"joint_deg": [0.1] * count})
+    said = f"has {count} values, expected 8: one per joint"
+    assert said in refused_text(tmp_path, text)
+    (tmp_path / "p.yaml").write_text(text.replace("joint_deg: []", "joint_deg: 0"))
+    text = edited(OBS1, ("errors",), {"joint_deg": [0.1] * 8})
+    (tmp_path / "p.yaml").write_text(text)
+    assert len(read_problem(tmp_path / "p.yaml").errors.joints) == 8
+
+
+def test_an_obstacle_has_another_name_than_what_a_link_carries(tmp_path: Path) -> None:
+    arm = ARM | {"bodies": [BALL]}
+    for name, good in (("b", False), ("b part 1", False), ("c part 1", True)):
+        text = edited(OBS1, ("obstacles",), [PILLAR | {"name": name}])
+        text = edited(text, ("manipulator",), arm)
+        if good:
+            (tmp_path / "p.yaml").write_text(text)
+            assert read_problem(tmp_path / "p.yaml").scene.names == (name,)
+        else:
+            said = f"is {name!r}, which a body of the arm is called"
+            assert said in refused_text(tmp_path, text)
+
+
+def test_what_is_told_to_be_solid_is_closed(tmp_path: Path) -> None:
+    for corners, solid, good in (
+        (TETRAHEDRON, True, True),
+        (TETRAHEDRON[1:], True, False),
+        (TETRAHEDRON[1:], False, True),
+    ):
+        path = mesh_problem(tmp_path, binary_stl(corners), solid=solid, scale=500.0)
+        if good:
+            (mesh,) = read_problem(path).scene.obstacles
+            assert getattr(mesh, "solid") is solid  # noqa: B009
+        else:
+            assert ".solid (line 9): is true, but 'part.stl' " in refusal(path)
+
+
 def test_a_half_space_has_no_middle_that_an_error_could_turn_it_about(
     tmp_path: Path,
 ) -> None:

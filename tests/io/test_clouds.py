@@ -94,6 +94,30 @@ def test_every_format_has_the_same_points(tmp_path: Path, name: str) -> None:
     assert exact
 
 
+@pytest.mark.parametrize("odd", ["-nan(ind)", "1.#QNAN", "none"])
+def test_values_beside_the_coordinates_may_be_any_words(
+    tmp_path: Path, odd: str
+) -> None:
+    rows = [row.split() for row in lines(POINTS).decode().splitlines()]
+    body = "\n".join(f"{odd} {x} {y} 0.5 {z}" for x, y, z in rows)
+    content = pcd("ascii", body.encode(), fields="normal x y intensity z")
+    assert np.array_equal(read(tmp_path / "a.pcd", content).points, POINTS)
+    wrong = body.replace("0.5", "0.5 7", 1)
+    content = pcd("ascii", wrong.encode(), fields="normal x y intensity z")
+    with pytest.raises(InvalidFile, match=r"line 12: has 6 values, expected 5"):
+        read(tmp_path / "a.pcd", content)
+
+
+def test_blank_lines_in_the_header_of_a_pcd_say_nothing(tmp_path: Path) -> None:
+    """As in PCL's reader."""
+    content = pcd("ascii", lines(POINTS)).replace(b"VERSION", b"\n\nVERSION")
+    for more in (b"", b"\n", b"\n# one\n"):
+        assert np.array_equal(read(tmp_path / "a.pcd", more + content).points, POINTS)
+    for nothing in (b"\n", b"\n" * 99):
+        with pytest.raises(InvalidFile, match="is no PCD file: no line DATA"):
+            read(tmp_path / "a.pcd", nothing)
+
+
 def test_arrays_are_points_or_cells(tmp_path: Path) -> None:
     path = tmp_path / "a.npy"
     assert np.array_equal(read(path, npy(path, POINTS)).points, POINTS)

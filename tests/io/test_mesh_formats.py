@@ -402,6 +402,8 @@ def with_more(key: str, *more: dict) -> Callable[[dict], None]:
                    {"mode": 0, "attributes": {}}), ("lines and points left out: 2",)),
         (with_more("primitives", {"attributes": {}}), ()),
         (with_more("nodes", {"mesh": 0}), ()),
+        (lambda document: document["nodes"].append({"name": "camera"})
+         or document["scenes"][0]["nodes"].append(len(document["nodes"]) - 1), ()),
         (with_more("scenes", {"nodes": []}), ("one of 2 scenes is read",)),
         (with_more("animations", {}),
          ("its motion is not read: parts stand where their nodes do",)),

@@ -112,6 +112,38 @@ def test_topics_are_chosen(tmp_path: Path, robot: Robot) -> None:
             read_bag(file)
 
 
+def test_the_message_of_a_bag_is_the_one_asked_for() -> None:
+    """Measured states are all of them; of plans there is one, or one is chosen."""
+    stamp = SimpleNamespace(sec=1, nanosec=0)
+    header = SimpleNamespace(stamp=stamp)
+    states = [SimpleNamespace(name=["a"], position=np.array([q]), header=header)
+              for q in (0.5, 1.5)]  # fmt: skip
+    found = bags._chosen(states, bags.STATES, "/a", "")
+    assert [one["positions"] for one in found["points"]] == [[0.5], [1.5]]
+    assert bags._chosen([7], bags.PLANS[0], "/a", "") == 7
+    assert [bags._chosen([7, 8], bags.PLANS[0], "/a", k) for k in "01"] == [7, 8]
+    with pytest.raises(InvalidInput, match="has 2 messages; choose by topic /a#K"):
+        bags._chosen([7, 8], bags.PLANS[0], "/a", "")
+    with pytest.raises(InvalidInput, match="has messages 0 to 1, not '2'"):
+        bags._chosen([7, 8], bags.PLANS[0], "/a", "2")
+
+
+def test_without_rosbags_it_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(InvalidFile, match=r"none\.mcap: does not exist"):
+        read_bag(tmp_path / "none.mcap")
+    monkeypatch.setattr(bags, "find_spec", lambda _: None)
+    with pytest.raises(InvalidFile, match=r"t\.bag: bags need rosbags: pip install"):
+        read_bag(tmp_path / "t.bag")
+    for ending in (".bag", ".mcap"):
+        with pytest.raises(
+            InvalidInput, match=rf"^\{ending} needs rosbags: pip install"
+        ):
+            write_bag(motion(0), tmp_path / f"t{ending}")
+    assert not any(tmp_path.iterdir())
+
+
 def test_bags_without_trajectories_are_told(tmp_path: Path) -> None:
     """No topic of one, and a topic without a message: there is none to choose."""
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
@@ -165,6 +197,8 @@ def test_what_is_wrong_with_messages_is_said(
     turned = {"positions": [90.0, 0.0]}
     for data, said in (
         (display, r"trajectory .*: has 2 trajectories, expected one$"),
+        (display | {"trajectory": [good, good]}, r"trajectory .*: has 2 traj"),
+        ({"trajectory": [good | {"points": []}]}, r"trajectory\[0\].*is no JointTraj"),
         ({"trajectory": []}, r"trajectory .*: has 0 trajectories, expected one$"),
         (good | {"points": [turned]}, "is it in degrees. expected radians$"),
         (good | {"points": [[0, 0]]}, r"points\[0\] .*: has no positions$"),

@@ -59,8 +59,6 @@ def _header(stream: MeshStream) -> _Header:
     said: dict[str, list[str]] = {}
     for number in range(1, _MOST_LINES + 1):
         words = stream.content.readline(MAX_MESH_LINE).decode("latin-1").split()
-        if not words and number == 1:
-            break
         if not words or words[0].startswith("#"):
             continue
         said[words[0]] = words[1:]

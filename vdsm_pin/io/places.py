@@ -72,8 +72,15 @@ class Place:
         return list(self.value)
 
     def number(self) -> float:
-        """A finite number."""
-        return float(Place(self.document, self.at, [self.value]).numbers(1)[0])
+        """A finite number.
+
+        Raises:
+            InvalidFile: If it is another thing.
+        """
+        if (found := finite_numbers([self.value], 1)) is None:
+            problem = f"is {str(self.value)[:60]}, expected a finite number"
+            raise self.invalid(problem)
+        return found[0]
 
     def numbers(self, count: int) -> FloatArray:
         """So many finite numbers, shape (count,).

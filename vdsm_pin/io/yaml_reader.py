@@ -182,8 +182,7 @@ class _Builder:
         if isinstance(event, yaml.AliasEvent):
             problem = f"is an alias (*{event.anchor}); write the value out"
             raise self._invalid(event, problem)
-        if not isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent):
-            raise self._invalid(event, "is not a value")
+        assert isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent)
         if event.tag is not None:
             problem = f"has the tag {event.tag!r}; a problem file holds plain data only"
             raise self._invalid(event, problem)
