@@ -12,6 +12,7 @@ from vdsm_pin import kept
 from vdsm_pin.app import doctor
 from vdsm_pin.app.doctor import Finding, examine
 from vdsm_pin.cli import main
+from vdsm_pin.io.atomic import writing
 
 ROOT = Path(__file__).parents[1]
 NO_OPENMP = "libgomp.so.1: cannot open shared object file"
@@ -85,6 +86,36 @@ def test_a_command_that_runs_out_of_memory_says_so_in_one_line(
         main(["doctor"])
     assert ended.value.code == 2
     assert capsys.readouterr().err == f"vdsm: there is too little memory{told}\n"
+
+
+def _no_room() -> None:
+    message = "libllvmlite.so: failed to map segment from shared object"
+    raise OSError(message)
+
+
+@pytest.mark.parametrize("kind", [ImportError, OSError])
+def test_a_library_that_finds_no_room_in_memory_is_too_little_memory(
+    kind: type[Exception],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Not a folder that cannot be written, and no status of a verdict."""
+
+    def unloadable(*_: object) -> None:
+        with writing(tmp_path):
+            try:
+                _no_room()
+            except OSError:
+                message = "Could not find/load shared object file"
+                raise kind(message) from None
+
+    monkeypatch.setattr(doctor, "examine", unloadable)
+    with pytest.raises(SystemExit) as ended:
+        main(["doctor"])
+    assert ended.value.code == 2
+    told = capsys.readouterr().err
+    assert told == "vdsm: there is too little memory; a library has no room\n"
 
 
 def test_a_command_that_cannot_load_a_library_says_so_in_one_line(

@@ -357,3 +357,16 @@ class VerificationFailed(VdsmError):
 
 class CertificateTooLarge(VerificationFailed):
     """A proof is more than a file can hold that is read again."""
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Whether an error, or one that led to it, is a lack of memory.
+
+    A library for which there is no room is told as a file that cannot be opened.
+    """
+    told: BaseException | None = error
+    while told is not None:
+        if isinstance(told, MemoryError) or "failed to map segment" in str(told):
+            return True
+        told = told.__cause__ or told.__context__
+    return False

@@ -14,7 +14,7 @@ import typer
 from vdsm_pin.cli import afterwards, batch, plan, start, verify, view
 from vdsm_pin.cli.ending import BAD_INPUT, fail, nobody_reads
 from vdsm_pin.cli.options import NOT_PASSED, PASSED
-from vdsm_pin.errors import InvalidInput, VdsmError
+from vdsm_pin.errors import InvalidInput, VdsmError, lacks_memory
 from vdsm_pin.startup import live_briefly
 from vdsm_pin.text import show_everything
 
@@ -74,15 +74,21 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         fail(error, NOT_PASSED)
     except BrokenPipeError:
         nobody_reads()
-    except OSError as error:
-        where, why = error.filename, error.strerror or error
-        fail(OSError(f"{where}: {why}" if where else str(why)), BAD_INPUT)
-    except MemoryError as error:
-        fail(
-            MemoryError(f"there is too little memory; {error}".rstrip("; ")), BAD_INPUT
-        )
-    except ImportError as error:
-        if (error.name or "").startswith("vdsm_pin"):
-            raise
-        fail(ImportError(f"{error}; vdsm doctor says what is missing"), NOT_PASSED)
+    except (OSError, ImportError, MemoryError) as error:
+        _fail_beside(error)
     sys.exit(PASSED)
+
+
+def _fail_beside(error: OSError | ImportError | MemoryError) -> NoReturn:
+    """End for what is no fault of the input: a disk, a library, too little memory."""
+    if lacks_memory(error):
+        said = error if isinstance(error, MemoryError) else "a library has no room"
+        told = f"there is too little memory; {said}".rstrip("; ")
+        fail(MemoryError(told), BAD_INPUT)
+    if isinstance(error, ImportError):
+        if (error.name or "").startswith("vdsm_pin"):
+            raise error
+        fail(ImportError(f"{error}; vdsm doctor says what is missing"), NOT_PASSED)
+    assert isinstance(error, OSError)  # no other is left
+    where, why = error.filename, error.strerror or error
+    fail(OSError(f"{where}: {why}" if where else str(why)), BAD_INPUT)

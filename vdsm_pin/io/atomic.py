@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from vdsm_pin.errors import CannotWrite, InvalidFile
+from vdsm_pin.errors import CannotWrite, InvalidFile, lacks_memory
 
 
 def check_replaceable(path: Path) -> None:
@@ -27,12 +27,16 @@ def writing(place: str | Path) -> Iterator[None]:
 
     Raises:
         CannotWrite: For the block's OSError.
+        MemoryError: If that is for want of memory.
     """
     try:
         yield
     except BrokenPipeError:  # of who reads what we print
         raise
     except OSError as error:
+        if lacks_memory(error):  # of a library that is loaded meanwhile
+            message = "a library has no room"
+            raise MemoryError(message) from error
         raise CannotWrite(file=place, reason=error.strerror or str(error)) from error
 
 
