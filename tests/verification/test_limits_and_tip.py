@@ -162,6 +162,36 @@ def test_a_tip_off_the_path_by_two_micrometres_is_refuted_at_its_row() -> None:
     assert row.worst == pytest.approx(2e-6, rel=1e-6)
 
 
+def test_what_is_not_proved_to_be_drawn_is_not_covered() -> None:
+    """Of 160 equal steps the two beside a row that is off are not drawn."""
+    problem, motion = drawing()
+    x0 = motion.x0.copy()
+    x0[17] += 2e-6
+    report = check_tip(problem, replace(motion, x0=x0))
+    assert report.coverage == pytest.approx(158 / 160, abs=1e-9)
+    np.testing.assert_allclose(report.undrawn, [[0.16, 0.18]], atol=1e-9)
+    row = named(report.checks, "coverage")
+    assert (row.verdict, row.worst) == (Verdict.INCOMPLETE, report.coverage)
+    # Rows that say they draw all of it, while the arm does not move.
+    still = {n: 0.0 * getattr(motion, n) for n in ("x0", "alpha", "theta")}
+    report = check_tip(problem, replace(motion, **still))
+    assert report.coverage < 0.02
+    assert named(report.checks, "coverage").verdict is Verdict.INCOMPLETE
+
+
+def test_a_step_that_cuts_a_corner_is_not_covered() -> None:
+    """The rows are on the path, the chord of the step at the first corner is not."""
+    problem, motion = drawing()
+    keep = np.ones(motion.n_samples, bool)
+    keep[30:51] = False
+    cut = Trajectory(*(getattr(motion, n)[keep] for n in
+                       ("on_path", "path_m", "x0", "alpha", "theta")))  # fmt: skip
+    report = check_tip(problem, cut)
+    assert report.deviation > problem.path.spacing
+    np.testing.assert_allclose(report.undrawn, [[0.29, 0.51]], atol=1e-9)
+    assert report.coverage == pytest.approx(138 / 160, abs=1e-9)
+
+
 def test_a_wrong_start_is_refuted() -> None:
     problem, motion = drawing()
     moved = replace(problem, tip_path=replace(problem.path, start=SQUARE[0] + 2e-6))

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
 from vdsm_pin.problem.desired_path import DesiredPath, Order
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -74,9 +74,12 @@ def drawn_intervals(trajectory: Trajectory) -> IntArray:
     return np.flatnonzero(both)
 
 
-def _stretches(path: DesiredPath, trajectory: Trajectory) -> FloatArray:
+def _stretches(
+    path: DesiredPath, trajectory: Trajectory, near: BoolArray
+) -> FloatArray:
     """The drawn stretches in order, inside [0, length], disjoint, shape (k, 2); [m]."""
     intervals = drawn_intervals(trajectory)
+    intervals = intervals[near[intervals]]
     if not intervals.size or trajectory.n_samples == 1:
         return np.zeros((0, 2))
     start = wrapped(path, trajectory.path_m)[intervals]
@@ -97,12 +100,16 @@ def _stretches(path: DesiredPath, trajectory: Trajectory) -> FloatArray:
     return np.asarray(np.column_stack([spans[fresh, 0], reach[last]]))
 
 
-def coverage(path: DesiredPath, trajectory: Trajectory) -> tuple[float, FloatArray]:
+def coverage(
+    path: DesiredPath, trajectory: Trajectory, near: BoolArray | None = None
+) -> tuple[float, FloatArray]:
     """Proved part of the path that is drawn, and the stretches that are not.
 
     Args:
         path: The desired path.
-        trajectory: Whose intervals with both rows on the path draw it.
+        trajectory: Whose intervals with both rows on the path say that they draw it.
+        near: Of which intervals that is proved, shape (n - 1,), of a single row (1,);
+            None for all.
 
     Returns:
         Coverage in [0, 1], rounded downwards, and gaps longer than
@@ -110,7 +117,8 @@ def coverage(path: DesiredPath, trajectory: Trajectory) -> tuple[float, FloatArr
     """
     if not path.length > 0.0:  # one point: drawn by any waypoint there
         return float(trajectory.on_path.any()), frozen(np.zeros((0, 2)))
-    spans = _stretches(path, trajectory)
+    every = np.ones(max(1, trajectory.n_samples - 1), np.bool_)
+    spans = _stretches(path, trajectory, every if near is None else near)
     edges = np.concatenate([[0.0], spans.ravel(), [path.length]]).reshape(-1, 2)
     gaps = edges[edges[:, 1] - edges[:, 0] > TOLERANCES.on_path_length]
     share = float(np.sum(spans[:, 1] - spans[:, 0])) / path.length

@@ -126,6 +126,12 @@ class Pair:
         return f"{self.own} and {self.label}"
 
 
+def _place(check: Check) -> str:
+    """Where its worst case is, in words."""
+    when = f"at waypoint {check.moment:.6g}" if isfinite(check.moment) else ""
+    return "".join(f", {words}" for words in (when, check.where) if words)
+
+
 @dataclass(frozen=True, repr=False)
 class ClosestApproach:
     """The clearance bracket of one pair over one interval, with its witness.
@@ -286,7 +292,7 @@ class Verification(Summarised):
             ("proved clearance", proved_mm(self.min_clearance)),
             ("waypoints", str(self.trajectory.n_samples)),
             *self._drawn(),
-            *((c.name, f"{c.verdict.value} {c.where}".strip()) for c in bad),
+            *((c.name, f"{c.verdict.value}{_place(c)}") for c in bad),
         )
 
     def _drawn(self) -> tuple[tuple[str, str], ...]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
 from vdsm_pin.geometry.bernstein import derivative
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -131,24 +131,37 @@ def _corner_deviation(
     return result
 
 
-def _deviation(
+def _deviations(
     problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
-) -> tuple[float, int]:
-    """Bound of the deviation over the intervals on the path, and where it is met."""
+) -> FloatArray:
+    """Bound of the deviation on each interval, 0 off the path; [m].
+
+    Returns:
+        Shape (n - 1,), of a single row (1,).
+    """
+    result = np.zeros(max(1, trajectory.n_samples - 1))
     intervals = drawn_intervals(trajectory)
     if not intervals.size:
-        return 0.0, 0
+        return result
     path, stations = problem.path, trajectory.path_m
     rows = np.linalg.norm(tips - path.at(wrapped(path, stations)), axis=1)
     if trajectory.n_samples == 1:
-        return float(rows[0]) + TOLERANCES.arithmetic, 0
+        return rows + TOLERANCES.arithmetic
     run, start = runs(path, stations)[intervals], wrapped(path, stations)[intervals]
     ends = np.maximum(rows[intervals], rows[intervals + 1])
     corners = _corner_deviation(path, tips, start, run, intervals)
     off_chord = second_derivatives(problem.manipulator, trajectory)[intervals] / 8.0
-    bound = np.maximum(ends, corners) + off_chord + TOLERANCES.arithmetic
-    worst = int(np.argmax(bound))
-    return float(bound[worst]), int(intervals[worst])
+    result[intervals] = np.maximum(ends, corners) + off_chord + TOLERANCES.arithmetic
+    return result
+
+
+def _kept(
+    problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
+) -> BoolArray:
+    """At which rows the tip is proved to be where the path is then, shape (n,)."""
+    goal = problem.path.at(wrapped(problem.path, trajectory.path_m))
+    gap = np.linalg.norm(tips - goal, axis=1)
+    return np.asarray(gap + TOLERANCES.arithmetic <= problem.tip_tolerance)
 
 
 def _row_check(
@@ -191,9 +204,13 @@ def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
         return TipReport(ends, 0.0, float("nan"), frozen(np.zeros((0, 2))))
     fine = _cut(problem, trajectory)
     some = tips if fine is trajectory else tip_positions(arm, fine)
-    deviation, interval = _deviation(problem, fine, some)
-    interval //= _parts(trajectory)
-    share, undrawn = coverage(problem.path, trajectory)
+    deviations = _deviations(problem, fine, some)
+    deviation = float(deviations.max())
+    interval = int(np.argmax(deviations)) // _parts(trajectory)
+    near = (deviations <= problem.path.spacing).reshape(max(1, len(tips) - 1), -1)
+    kept = trajectory.on_path & _kept(problem, trajectory, tips)
+    drawing = replace(trajectory, on_path=kept)
+    share, undrawn = coverage(problem.path, drawing, near.all(axis=1))
     checks = (
         *ends,
         _row_check(problem, trajectory, tips),
