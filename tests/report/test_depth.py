@@ -9,6 +9,7 @@ import pytest
 
 from vdsm_pin.geometry.solids import Box
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.facts import min_clearance, verification_file
@@ -20,14 +21,15 @@ from vdsm_pin.verification.records import Verification
 from vdsm_pin.verification.verify import verify
 
 
-def beside_a_box(gap: float) -> Verification:
+def beside_a_box(gap: float, base_turn: float = 0.0) -> Verification:
     """The straight arm along a box whose face is so far from the axis; [m]."""
     problem = read_problem("paper/free")
     half = np.array([2.0, 0.5, 0.5])
     box = Box("box", np.array([1.5, 0.0, gap + 0.5]), np.eye(3), half)
     zero, links = np.zeros(1), np.zeros((1, problem.manipulator.n_links))
     rows = Trajectory(zero.astype(bool), zero, zero, links, links)
-    problem = replace(problem, scene=Scene((box,)))
+    errors = ErrorBox(base_turn=base_turn)
+    problem = replace(problem, scene=Scene((box,)), errors=errors)
     return verify(problem, rows)
 
 
@@ -60,3 +62,13 @@ def test_a_refuted_clearance_never_reads_as_its_limit() -> None:
         assert told == ("4.999 mm", "5.000 mm")
     told = check_cells(replace(row, worst=0.0049984, limit=0.005, deeper=False))
     assert told == ("4.999 mm", "5.000 mm")
+
+
+def test_a_bound_that_leaves_the_verdict_open_is_no_depth() -> None:
+    """The arm is 0.4 m off; nothing is found under a turn that is not searched."""
+    found = beside_a_box(0.4, base_turn=3.0)
+    row = next(one for one in found.checks if one.name == "clearance from obstacles")
+    assert row.verdict == "undecided"
+    assert not row.deeper
+    told = f"clearance from obstacles is proved to be at least {check_cells(row)[0]} "
+    assert told in reason(replace(found, checks=(row,)))

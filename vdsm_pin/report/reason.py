@@ -18,6 +18,7 @@ from vdsm_pin.report.words import (
     quantity,
 )
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.clearance_check import LINKS, OBSTACLES
 from vdsm_pin.verification.inside import ARM_OUTSIDE, LINKS_OUTSIDE, surfaces
 from vdsm_pin.verification.records import (
     ArmVerification,
@@ -64,7 +65,8 @@ def reason(verification: Verification) -> str:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
     worst, asked = check_cells(first)
-    found = f"{first.name} is {worst}"
+    proved = first.name in (LINKS, OBSTACLES) and first.verdict is Verdict.UNDECIDED
+    found = f"{first.name} is {'proved to be at least ' * proved}{worst}"
     inside = first.name in (ARM_OUTSIDE, LINKS_OUTSIDE)
     if inside:
         found = first.where

@@ -140,7 +140,8 @@ def _row(row: Check, evidence: Evidence, mine: IntArray) -> Check:
         worst=worst,
         where=where,
         moment=float(least.interval[k] + least.share[k]) if seen else nan,
-        deeper=evidence.deepest(k, worst),
+        # Of what is undecided the worst is a bound, and no depth that was found.
+        deeper=verdict is not Verdict.UNDECIDED and evidence.deepest(k, worst),
     )
 
 

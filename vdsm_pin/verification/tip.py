@@ -146,7 +146,7 @@ def _deviations(
     path, stations = problem.path, trajectory.path_m
     rows = np.linalg.norm(tips - path.at(wrapped(path, stations)), axis=1)
     if trajectory.n_samples == 1:
-        return rows + TOLERANCES.arithmetic
+        return np.asarray(rows + TOLERANCES.arithmetic)
     run, start = runs(path, stations)[intervals], wrapped(path, stations)[intervals]
     ends = np.maximum(rows[intervals], rows[intervals + 1])
     corners = _corner_deviation(path, tips, start, run, intervals)
@@ -210,7 +210,7 @@ def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
     near = (deviations <= problem.path.spacing).reshape(max(1, len(tips) - 1), -1)
     kept = trajectory.on_path & _kept(problem, trajectory, tips)
     drawing = replace(trajectory, on_path=kept)
-    share, undrawn = coverage(problem.path, drawing, near.all(axis=1))
+    share, undrawn = coverage(problem.path, drawing, np.asarray(near.all(axis=1)))
     checks = (
         *ends,
         _row_check(problem, trajectory, tips),
