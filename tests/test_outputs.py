@@ -14,8 +14,7 @@ import pytest
 from vdsm_pin import api
 from vdsm_pin.app import arm_subject
 from vdsm_pin.app.workflow import planned_by
-from vdsm_pin.batch.folders import folder_names
-from vdsm_pin.batch.manifest import finished
+from vdsm_pin.batch.folders import finished, folder_names
 from vdsm_pin.batch.run import OWN, Batch, run_batch, seconds_of
 from vdsm_pin.batch.task import MANIFEST, TIMING, Settings, Task
 from vdsm_pin.batch.worker import perform

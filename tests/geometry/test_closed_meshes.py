@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.closed_meshes import close_mesh, closed_parts
-from vdsm_pin.geometry.mesh_gaps import SLANT, clusters
+from vdsm_pin.geometry.mesh_edges import SLANT, clusters
 from vdsm_pin.geometry.winding import Location, Side, locate
 
 RADIUS = 0.02

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vdsm_pin.geometry import mesh_gaps
+from vdsm_pin.geometry import mesh_edges
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.closed_meshes import (
     SIGNED,
@@ -18,15 +18,17 @@ from vdsm_pin.geometry.closed_meshes import (
     _Search,
 )
 from vdsm_pin.geometry.mesh_edges import (
+    SLANT,
     Covers,
     attached,
     closes,
     counted,
     edge_keys,
+    off_segment,
     open_edges,
+    seams_along,
     welded,
 )
-from vdsm_pin.geometry.mesh_gaps import SLANT, off_segment, seams_along
 from vdsm_pin.tolerances import TOLERANCES
 
 Edge = tuple[int, int]
@@ -208,7 +210,7 @@ def test_seams_join_an_edge_and_the_corners_on_it(
         for c in loose
     )
     for most, told in ((looked_at, len(expected)), (looked_at - 1, 0)):
-        monkeypatch.setattr(mesh_gaps, "MANY", most)
+        monkeypatch.setattr(mesh_edges, "MANY", most)
         assert len(seams_along(vertices, edges, at, 0.05).beside) == told
 
 

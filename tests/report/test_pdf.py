@@ -7,10 +7,9 @@ import made_up
 import pytest
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.report.browser import find_browser
+from vdsm_pin.report.browser import find_browser, print_page
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
-from vdsm_pin.report.pdf import print_page
 
 
 def stand_in(folder: Path, script: str) -> str:

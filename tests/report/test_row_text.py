@@ -7,7 +7,7 @@ import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.decimals import WORD
-from vdsm_pin.report.row_text import Form
+from vdsm_pin.report.tables import Form
 
 
 def written(values: FloatArray, decimals: int, rounding: int) -> list[str]:

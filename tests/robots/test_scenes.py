@@ -9,7 +9,7 @@ import pytest
 from tests.robots.test_robots import CELL, URDF, mutated, write
 from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Mesh, Sphere
-from vdsm_pin.robots import mjcf_size
+from vdsm_pin.robots import mjcf
 from vdsm_pin.robots.cell import cell_of, read_cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.scene_files import read_scene
@@ -200,11 +200,11 @@ def test_what_a_world_repeats_is_counted_before_it_is_made(
     head = asset if "attach" in content else ""
     text = f"<mujoco>{head}<worldbody>{content}</worldbody></mujoco>"
     file = write(tmp_path, "world.xml", text)
-    monkeypatch.setattr(mjcf_size, "MOST", elements)
-    mjcf_size.check_size(file)
-    monkeypatch.setattr(mjcf_size, "MOST", elements - 1)
+    monkeypatch.setattr(mjcf, "MOST", elements)
+    mjcf.check_size(file)
+    monkeypatch.setattr(mjcf, "MOST", elements - 1)
     with pytest.raises(InvalidFile, match=f"has {elements} elements"):
-        mjcf_size.check_size(file)
+        mjcf.check_size(file)
 
 
 def test_what_a_world_includes_is_in_the_hash(tmp_path: Path) -> None:

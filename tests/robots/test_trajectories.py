@@ -22,9 +22,9 @@ from vdsm_pin.io.trajectory_messages import of_message, text_of
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.robots.by_itself import rate_checks
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.model import Robot, RobotJoint
-from vdsm_pin.robots.rates import rate_checks
 from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.trajectory_files import read_motion, read_path
 from vdsm_pin.robots.urdf import read_robot

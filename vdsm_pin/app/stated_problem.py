@@ -9,6 +9,84 @@ from vdsm_pin.report.folder import check_kept, check_output_file
 if TYPE_CHECKING:  # an arm's certificate needs nothing of robots
     from vdsm_pin.robots.cell import Cell
     from vdsm_pin.robots.files import RobotFiles
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import yaml
+
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.files import RobotFiles
+from vdsm_pin.units import MM_PER_M
+
+
+def problem_text(
+    cell: Cell, files: RobotFiles, scene: Path | None, folder: Path
+) -> str:
+    """The text of a problem file in a folder; what is as by default is left out.
+
+    Args:
+        cell: What is asked.
+        files: Of its robot.
+        scene: The file of its obstacles; None for none.
+        folder: Where the text will stand: files are named relative to it.
+    """
+
+    def named(file: Path | None) -> str | None:
+        if file is None:
+            return None
+        return os.path.relpath(os.path.realpath(file), os.path.realpath(folder))
+
+    robot = {
+        "urdf": named(files.urdf),
+        "srdf": named(files.srdf),
+        "package_dirs": [named(one) for one in files.package_dirs],
+        "lock": dict(files.lock),
+        "group": files.group,
+        "bodies": files.solids.cover,
+        "parts": files.solids.parts if files.solids.cover == "parts" else None,
+        "joint_limits": named(files.joint_limits),
+    }
+    whole = {
+        "vdsm_problem": 1,
+        "length_unit": "mm",
+        "robot": _given(robot),
+        "required_clearance": cell.required_clearance * MM_PER_M,
+        "required_self_clearance": cell.required_self_clearance * MM_PER_M,
+        "errors": _errors(cell.errors),
+        "scene": named(scene),
+    }
+    return yaml.safe_dump(_given(whole), sort_keys=False, allow_unicode=True)
+
+
+def _given(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Those that are not empty; a clearance of 0 is stated."""
+    return {key: value for key, value in values.items() if value not in (None, [], {})}
+
+
+def _errors(box: ErrorBox) -> dict[str, Any]:
+    """Errors as a problem file has them: in degrees and millimetres."""
+    turns = {one.name: _deg(one.turn) for one in box.named if one.turn}
+    slides = {one.name: one.shift * MM_PER_M for one in box.named if one.shift}
+    off = [
+        {"name": one.name, "shift": one.shift * MM_PER_M, "turn_deg": _deg(one.turn)}
+        for one in box.obstacles
+    ]
+    stated: dict[str, Any] = {
+        "joint_deg": turns or _deg(box.joint),
+        "slide": slides or box.slide * MM_PER_M,
+        "base": box.base * MM_PER_M,
+        "base_deg": _deg(box.base_turn),
+        "obstacle": box.obstacle * MM_PER_M,
+        "obstacles": off,
+    }
+    return {key: value for key, value in stated.items() if value}
+
+
+def _deg(angle: float) -> float:
+    return float(np.rad2deg(angle))
 
 
 def problem_beside(certificate: Path) -> Path:
@@ -36,7 +114,6 @@ def stated_cell(
         InvalidInput: If the file cannot be written, or is one that is read.
     """
     from vdsm_pin.robots.cell import read_cell
-    from vdsm_pin.robots.problem_text import problem_text
 
     path = problem_beside(certificate)
     for output in (certificate, path):

@@ -29,7 +29,7 @@ from vdsm_pin.io.source import (
 from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.progress import step
-from vdsm_pin.report.browser import find_browser
+from vdsm_pin.report.browser import find_browser, print_page
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import (
@@ -38,7 +38,6 @@ from vdsm_pin.report.folder import (
     check_output_folder,
     staged,
 )
-from vdsm_pin.report.pdf import print_page
 from vdsm_pin.report.run_record import RunRecord, now
 from vdsm_pin.report.tables import (
     ClearanceCsv,

@@ -14,9 +14,8 @@ from typing import Final
 from pydantic import ValidationError
 
 from vdsm_pin.app.workflow import NO_PLAN, REPORT
-from vdsm_pin.batch.folders import folder_names, jobs_by_name
+from vdsm_pin.batch.folders import MAX_BYTES, folder_names, jobs_by_name, write_manifest
 from vdsm_pin.batch.inputs import expanded, motions
-from vdsm_pin.batch.manifest import MAX_BYTES, write_manifest
 from vdsm_pin.batch.pool import Ended, run_tasks
 from vdsm_pin.batch.progress import progress
 from vdsm_pin.batch.task import (

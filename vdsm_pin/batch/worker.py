@@ -14,7 +14,7 @@ from vdsm_pin.app.workflow import (
     plan_to_folder,
     verify_to_folder,
 )
-from vdsm_pin.batch.manifest import finished, write_manifest
+from vdsm_pin.batch.folders import finished, write_manifest
 from vdsm_pin.batch.task import (
     CERTIFICATE,
     PDF,

@@ -31,8 +31,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.errors import joint_errors
+from vdsm_pin.robots.cell import Cell, joint_errors
 from vdsm_pin.robots.files import HULLS
 from vdsm_pin.robots.inside import at_start, question_of_hulls, unlocated_pairs
 from vdsm_pin.robots.judgement import RobotVerification

@@ -16,19 +16,17 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct, frozen
 from vdsm_pin.geometry.mesh_edges import (
+    NO_SEAMS,
     Covers,
+    Seams,
     attached,
     closes,
-    counted,
-    open_edges,
-    welded,
-)
-from vdsm_pin.geometry.mesh_gaps import (
-    NO_SEAMS,
-    Seams,
     clusters,
+    counted,
     off_segment,
+    open_edges,
     seams_along,
+    welded,
 )
 from vdsm_pin.tolerances import TOLERANCES
 

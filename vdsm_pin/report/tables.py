@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
 from functools import cache
+from itertools import accumulate
 from pathlib import Path
 from typing import Final
 
@@ -14,8 +15,8 @@ import numpy as np
 
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres, link_angles, position_angles
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.decimals import WORD
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.decimals import LONGEST, WORD, put_rows
 from vdsm_pin.io.tables import quoted
 from vdsm_pin.io.waypoint_rows import PLACE, WAYPOINT
 from vdsm_pin.io.waypoint_tables import cable_columns, centre_columns
@@ -23,10 +24,38 @@ from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.row_text import Form
 from vdsm_pin.verification.brackets import ClearanceChunk, LeastClearances
 from vdsm_pin.verification.coal_rows import NOTHING_MEASURED, CoalIndex
 from vdsm_pin.verification.records import ArmVerification, Pair, Verification
+
+
+class Form:
+    """How the columns of a table are written.
+
+    Args:
+        decimals: Most decimals of each column, trailing zeros left out; `WORD` for a
+            column that holds numbers of words.
+        rounding: -1 downwards, 0 to the nearest, 1 upwards; by column.
+        words: The words, as they shall stand in the file.
+    """
+
+    def __init__(
+        self, decimals: Sequence[int], rounding: Sequence[int], words: Sequence[str]
+    ) -> None:
+        texts = [word.encode() for word in words]
+        self._columns = frozen(decimals, np.int64), frozen(rounding, np.int64)
+        self._words = frozen(bytearray(b"".join(texts)), np.uint8)
+        self._ends = frozen([0, *accumulate(map(len, texts))], np.int64)
+        longest = max(LONGEST, *(len(text) + 1 for text in (b"", *texts)))
+        self._room = len(decimals) * longest
+
+    def rows(self, table: FloatArray) -> memoryview:
+        """The rows of a table as bytes, shape (n, n_columns)."""
+        out = np.zeros(len(table) * self._room, dtype=np.uint8)
+        rows = np.ascontiguousarray(table, dtype=np.float64)
+        size = put_rows(rows, *self._columns, self._words, self._ends, out)
+        return out[:size].data
+
 
 _VERDICTS: Final = ("certified", "refuted", "undecided")
 _CLEARANCE_HEADER: Final = (

@@ -1,4 +1,8 @@
-"""What is judged of a robot by itself: its poses by Pinocchio, its joint limits."""
+"""What is judged of a robot by itself: its poses by Pinocchio, limits of its joints.
+
+The derivative of a piece is a polynomial; its control points bound rates between
+waypoints, and it is cut where they do not decide.
+"""
 
 from math import nan
 from typing import Final
@@ -6,12 +10,12 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import VdsmError
+from vdsm_pin.geometry.bernstein import derivative
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.rates import rate_checks
+from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.extremes import range_check
+from vdsm_pin.verification.extremes import largest, range_check
 from vdsm_pin.verification.records import Check, Verdict
 
 POSES: Final = "link poses by Pinocchio against the tree's"
@@ -53,3 +57,35 @@ def checks_by_itself(robot: Robot, path: Path) -> list[Check]:
             row = Check(name, Verdict.UNDECIDED, n, nan, nan, joint.unit, joint.whose)
             rows.append(range_check(path, k, ends, TOLERANCES.arithmetic, row))
     return [*rows, *rate_checks(robot.joints, path)]
+
+
+def rate_checks(joints: tuple[RobotJoint, ...], path: Path) -> list[Check]:
+    """A row for each stated limit; none where the motion has no times.
+
+    Straight lines have no acceleration but at their corners, where it is undefined: a
+    limit of it is undecided.
+    """
+    if path.times is None or len(path.knots) == 1:
+        return []
+    controls, step = path.controls, np.diff(path.times)[:, None, None]
+    checks = []
+    for order, word in enumerate(("velocity", "acceleration"), start=1):
+        limits = np.array([getattr(joint, word) for joint in joints])
+        if controls.shape[1] > 1:
+            with np.errstate(over="ignore"):  # beyond any limit
+                controls = derivative(controls) / step
+        for k in np.flatnonzero(np.isfinite(limits)):
+            joint = joints[k]
+            name = f"joint {joint.name!r} in its {word} limit"
+            unit = joint.unit + ("/s" if order == 1 else "/s^2")
+            if order > path.degree:
+                where = "straight lines change their rates at once"
+                none = Verdict.UNDECIDED, path.n_intervals, nan
+                checks.append(Check(name, *none, float(limits[k]), unit, where))
+                continue
+            limit, each = float(limits[k]), [(0, controls[:, :, k, None])]
+            most = limit * (1.0 + TOLERANCES.arithmetic)
+            found = largest(each, np.abs, most)
+            told = found.verdict(most), path.n_intervals, found.worst(most), limit
+            checks.append(Check(name, *told, unit, joint.whose, found.moment))
+    return checks

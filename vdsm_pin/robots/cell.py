@@ -1,5 +1,6 @@
 """A robot among its obstacles: from files named one by one, or from a problem file."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -7,24 +8,60 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.io.source import path_of
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import PairTable
-from vdsm_pin.robots.errors import check_errors, joint_errors
 from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
-from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.other_robots import read_other
 from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import in_mm
-from vdsm_pin.verification.assembly import Assembly
+from vdsm_pin.verification.assembly import Assembly, obstacle_growth
 from vdsm_pin.verification.coal_bodies import coal_obstacle
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
+
+
+def check_errors(robot: Robot, scene: Scene, errors: ErrorBox) -> None:
+    """Refuse errors of what there is not.
+
+    Raises:
+        UnknownName: If they name a joint that does not move, or no obstacle.
+        InvalidInput: If they count joints, turn one that slides or the reverse, or turn
+            a half-space.
+    """
+    if errors.joints:
+        message = "joint errors of a robot are one number, or by name: JOINT=DEG"
+        raise InvalidInput(message)
+    joints = {joint.name: joint for joint in robot.joints}
+    for one in errors.named:
+        if one.name not in joints:
+            raise UnknownName(kind="moving joint", name=one.name, known=tuple(joints))
+        wrong = one.shift if joints[one.name].turns else one.turn
+        if wrong:
+            turns = joints[one.name].turns
+            way, unit = ("turns", "degrees") if turns else ("slides", "millimetres")
+            message = f"joint {one.name!r} {way}: expected its error in {unit}"
+            raise InvalidInput(message)
+    for obstacle in errors.obstacles:
+        if obstacle.name not in scene.names:
+            raise UnknownName(kind="obstacle", name=obstacle.name, known=scene.names)
+    obstacle_growth(scene.obstacles, errors)
+
+
+def joint_errors(joints: Sequence[RobotJoint], errors: ErrorBox) -> FloatArray:
+    """Largest error of each joint that a trajectory moves, (n_joints,); [rad], [m]."""
+    plain = [errors.joint if joint.turns else errors.slide for joint in joints]
+    largest = dict(zip((joint.name for joint in joints), plain, strict=True))
+    for one in errors.named:  # of one that turns the shift is 0, and the reverse
+        largest[one.name] = max(largest[one.name], one.turn, one.shift)
+    return np.array([*largest.values()])
+
 
 ROOT_FRAME: Final = 1
 """The frame that obstacles stand in: of the root link, where it does not move."""

@@ -1,20 +1,21 @@
 """A URDF and its SRDF to a robot: joints, solids, pairs that are held apart."""
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+
+import numpy as np
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.source import naming
 from vdsm_pin.io.tables import listed
-from vdsm_pin.proof.bodies import Body
+from vdsm_pin.proof.bodies import Body, LeftOut
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.joints import JointReader, Moving
 from vdsm_pin.robots.link_solids import LinkReader
 from vdsm_pin.robots.model import Robot, reach_of
-from vdsm_pin.robots.pairs import held_pairs
 from vdsm_pin.robots.srdf import Srdf
 from vdsm_pin.robots.xacro import urdf_text
 
@@ -98,3 +99,39 @@ def _bodies(
         problem = "no link has a collision solid: there is nothing to prove"
         raise joints.invalid(problem)
     return tuple(found)
+
+
+def held_pairs(
+    tree: Tree,
+    bodies: tuple[Body, ...],
+    disabled: Mapping[frozenset[str], str],
+    adjacent: bool,
+) -> tuple[tuple[tuple[int, int], ...], tuple[LeftOut, ...]]:
+    """Which links are held apart, and which are not.
+
+    Args:
+        tree: The joints.
+        bodies: The links with solids.
+        disabled: What the SRDF leaves out.
+        adjacent: Whether neighbours are left out too, where there is no SRDF.
+    """
+    held, left_out = [], []
+    for i, one in enumerate(bodies):
+        for k in range(i + 1, len(bodies)):
+            other = bodies[k]
+            ways = tree.way(one.frame, other.frame)
+            between = [
+                int(j)
+                for j in np.concatenate(ways)
+                if tree.joints[j].column is not None
+            ]
+            reason = disabled.get(frozenset((one.name, other.name)), "")
+            if not between:
+                reason = "no joint between them moves"
+            elif adjacent and len(between) == 1 and not reason:
+                reason = "neighbours, joined by one joint"
+            if reason:
+                left_out.append(LeftOut(one.name, other.name, reason))
+            else:
+                held.append((i, k))
+    return tuple(held), tuple(left_out)
