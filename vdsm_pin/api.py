@@ -326,9 +326,7 @@ def write_certificate(
 
 @overload
 def read_trajectory(
-    path: str | Path,
-    problem: PlanningProblem,
-    interpolation: Interpolation = "auto",
+    path: str | Path, problem: PlanningProblem, interpolation: Interpolation = "auto"
 ) -> Trajectory: ...
 
 

@@ -89,10 +89,7 @@ class Refinement:
 
 
 def plan_and_verify(
-    problem: PlanningProblem,
-    strategy_name: str,
-    *,
-    deadline: Deadline = NO_LIMIT,
+    problem: PlanningProblem, strategy_name: str, *, deadline: Deadline = NO_LIMIT
 ) -> Refinement:
     """Plan by a strategy until the verification has nothing against the plan.
 
@@ -118,10 +115,7 @@ def plan_and_verify(
     found = _plan_at_rest(still, strategy_name, deadline)
     plan = waited(found.plan, problem)
     verification = verify(
-        _promised(problem),
-        plan.trajectory,
-        deadline=deadline,
-        centres=plan.centres,
+        _promised(problem), plan.trajectory, deadline=deadline, centres=plan.centres
     )
     if verification.verdict not in HANDED_OUT:
         deadline.check(UNPROVED)
@@ -132,9 +126,7 @@ def plan_and_verify(
 
 
 def _plan_at_rest(
-    problem: PlanningProblem,
-    strategy_name: str,
-    deadline: Deadline,
+    problem: PlanningProblem, strategy_name: str, deadline: Deadline
 ) -> Refinement:
     """`plan_and_verify` of a problem in which no obstacle moves."""
     plan_with = with_ends(problem, strategy(strategy_name))
@@ -159,10 +151,7 @@ def _plan_at_rest(
             rounds.append(_measured(margins, adjustments))
         else:
             verification = verify(
-                promised,
-                plan.trajectory,
-                deadline=deadline,
-                centres=plan.centres,
+                promised, plan.trajectory, deadline=deadline, centres=plan.centres
             )
             if verification.verdict not in HANDED_OUT:
                 deadline.check(UNPROVED)

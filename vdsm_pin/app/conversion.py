@@ -12,11 +12,7 @@ from vdsm_pin.app.workflow import TRAJECTORY
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.bags import is_bag, read_bag, write_bag
-from vdsm_pin.io.trajectory_file import (
-    joint_names,
-    read_trajectory,
-    write_trajectory,
-)
+from vdsm_pin.io.trajectory_file import joint_names, read_trajectory, write_trajectory
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory, text_of
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
 from vdsm_pin.problem.joint_trajectory import JointTrajectory

@@ -11,13 +11,7 @@ from vdsm_pin.app.visualization import drawing
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.report.drawing import Drawing
-from vdsm_pin.report.film import (
-    FRAMES_PER_SECOND,
-    Shot,
-    encode,
-    find_encoder,
-    pictures,
-)
+from vdsm_pin.report.film import FRAMES_PER_SECOND, Shot, encode, find_encoder, pictures
 from vdsm_pin.report.folder import check_kept, check_output_file
 from vdsm_pin.report.gltf import glb, play_times
 from vdsm_pin.report.html import view_page

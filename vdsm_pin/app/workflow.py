@@ -14,12 +14,7 @@ from pydantic import ValidationError
 from vdsm_pin.app.arm_subject import CABLES, CENTRES, LINK_ANGLES
 from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions
 from vdsm_pin.app.subjects import ProblemOrCell, Subject, subject_of
-from vdsm_pin.errors import (
-    Infeasible,
-    InvalidFile,
-    OutOfTime,
-    VerificationFailed,
-)
+from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime, VerificationFailed
 from vdsm_pin.io.source import (
     check_is_file_or_bag,
     check_unchanged,
@@ -39,11 +34,7 @@ from vdsm_pin.report.folder import (
     staged,
 )
 from vdsm_pin.report.run_record import RunRecord, now
-from vdsm_pin.report.tables import (
-    ClearanceCsv,
-    write_cables,
-    write_centres,
-)
+from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_centres
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import Verdict, Verification

@@ -17,16 +17,8 @@ from vdsm_pin.certificate_writer.lines import (
     check_certified,
     write_lines,
 )
-from vdsm_pin.certificate_writer.links import (
-    Covers,
-    link_pieces,
-    links_of_others,
-)
-from vdsm_pin.certificate_writer.schema import (
-    Pair,
-    RobotErrors,
-    RobotHeaderLine,
-)
+from vdsm_pin.certificate_writer.links import Covers, link_pieces, links_of_others
+from vdsm_pin.certificate_writer.schema import Pair, RobotErrors, RobotHeaderLine
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.bodies import Body, PairTable

@@ -36,8 +36,7 @@ def check_certificate(
     ],
     problem: ProblemArgument,
     trajectory: Annotated[
-        Path,
-        typer.Argument(metavar="TRAJECTORY", help="The motion that it is about."),
+        Path, typer.Argument(metavar="TRAJECTORY", help="The motion that it is about.")
     ],
     *,
     answer: Answer,

@@ -29,7 +29,7 @@ commands = family()
         "vdsm batch --out out/demo",
         "vdsm batch problems/*.yaml --out out/night --jobs 8 --time-limit 60 --resume",
         "vdsm batch cell.yaml --trajectories plans --out out/plans",
-    ),
+    )
 )
 @grouped
 def batch(

@@ -14,10 +14,7 @@ commands = family()
 
 
 @commands.command(
-    epilog=examples(
-        "vdsm problems",
-        "vdsm problems --show paper/obs1 > mine.yaml",
-    ),
+    epilog=examples("vdsm problems", "vdsm problems --show paper/obs1 > mine.yaml")
 )
 def problems(
     show: Annotated[

@@ -28,7 +28,7 @@ WIDTH, HEIGHT, OVERVIEW = 1280, 720, "overview"
     epilog=examples(
         "vdsm view paper/obs1 --trajectory out/obs1/trajectory.csv",
         "vdsm view paper/obs1 --html obs1.html",
-    ),
+    )
 )
 def view(
     problem: ProblemArgument,
@@ -68,7 +68,7 @@ def view(
         "vdsm export paper/obs1 --trajectory out/obs1/trajectory.csv --out obs1.glb",
         "vdsm export mine.yaml --trajectory mine.csv --out mine.png --moment 120",
         "vdsm export mine.yaml --trajectory mine.csv --out mine.mp4 --look tip",
-    ),
+    )
 )
 @grouped
 def export(

@@ -6,12 +6,7 @@ from typing import Any, Final, cast
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
-from numba.extending import (
-    infer_getattr,
-    lower_getattr_generic,
-    models,
-    register_model,
-)
+from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 
 OPTIONS: Final = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 """No fast-math: the bounds rest on every operation being rounded once, as written.

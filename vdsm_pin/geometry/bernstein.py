@@ -51,10 +51,7 @@ def part(controls: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray
 
 
 def hermite(
-    values: FloatArray,
-    rates: FloatArray,
-    changes: FloatArray | None,
-    times: FloatArray,
+    values: FloatArray, rates: FloatArray, changes: FloatArray | None, times: FloatArray
 ) -> FloatArray:
     """Inner control points of the pieces that trajectory controllers run.
 
@@ -74,8 +71,5 @@ def hermite(
     if changes is None:
         return np.stack(ends, axis=1)
     bend, bend_after = step**2 * changes[:-1] / 20.0, step**2 * changes[1:] / 20.0
-    inner = (
-        values[:-1] + 2.0 * before + bend,
-        values[1:] - 2.0 * after + bend_after,
-    )
+    inner = (values[:-1] + 2.0 * before + bend, values[1:] - 2.0 * after + bend_after)
     return np.stack([ends[0], *inner, ends[1]], axis=1)

@@ -11,13 +11,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows, frozen
 from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
-from vdsm_pin.geometry.convex import (
-    FlatCylinder,
-    Hull,
-    Hulls,
-    ends_of,
-    placed_piece,
-)
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls, ends_of, placed_piece
 from vdsm_pin.geometry.primitives import BOX_CORNERS, NamedSolid
 
 

@@ -27,11 +27,7 @@ def _left_of(a: FloatArray, b: FloatArray, x: float, y: float) -> bool:
 def _passes(pieces: PackedPieces, p: int, x: float, y: float, z: float) -> int:
     """Sense in which the ray from a point along +z passes a triangle, 0 for none."""
     start = pieces.first_point[p]
-    a, b, c = (
-        pieces.points[start],
-        pieces.points[start + 1],
-        pieces.points[start + 2],
-    )
+    a, b, c = (pieces.points[start], pieces.points[start + 1], pieces.points[start + 2])
     if not _left_of(a, b, x, y) ^ _left_of(b, c, x, y) ^ _left_of(c, a, x, y):
         return 0
     u = (b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)

@@ -98,11 +98,7 @@ def box_support(
 
 @compiled
 def obstacle_bracket(
-    pieces: PackedPieces,
-    obstacle: int,
-    body: Body,
-    goal: float,
-    work: Measuring,
+    pieces: PackedPieces, obstacle: int, body: Body, goal: float, work: Measuring
 ) -> None:
     """Distance between a body and an obstacle's pieces.
 

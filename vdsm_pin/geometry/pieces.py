@@ -12,13 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.convex import (
-    FlatCylinder,
-    HalfSpacePiece,
-    Hull,
-    Hulls,
-    Piece,
-)
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Hulls, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 
 HELD: Final = 1.0 + 4.0 * float(np.finfo(float).eps)

@@ -161,9 +161,7 @@ def _bodies(
         yield Moving(named, carrier, link_frame(link))
 
 
-def files_of_arm(
-    model: str | ManipulatorModel | UrdfManipulatorModel,
-) -> list[str]:
+def files_of_arm(model: str | ManipulatorModel | UrdfManipulatorModel) -> list[str]:
     """The URDF of an arm, or the meshes that its links carry."""
     if isinstance(model, UrdfManipulatorModel):
         return [model.urdf]

@@ -100,10 +100,7 @@ def joined(
 
 
 def _errors(
-    model: ErrorsModel,
-    frame: Frame,
-    known: tuple[int, Scene],
-    document: YamlDocument,
+    model: ErrorsModel, frame: Frame, known: tuple[int, Scene], document: YamlDocument
 ) -> ErrorBox:
     """The errors under which every clearance is asked for."""
     n_links, scene = known

@@ -24,9 +24,7 @@ _EITHER: Final[Mapping[str | int, str]] = {
 }
 """What fields of two forms take."""
 
-_NAMES: Final = {
-    NAME_PATTERN: "signs that can be seen, no space or = + - @ first",
-}
+_NAMES: Final = {NAME_PATTERN: "signs that can be seen, no space or = + - @ first"}
 
 
 _WORDS: Final = {

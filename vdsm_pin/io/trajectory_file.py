@@ -96,9 +96,7 @@ def _rows_text(trajectory: Trajectory, first: int) -> bytes:
 
 
 def read_trajectory(
-    path: str | Path,
-    manipulator: Manipulator,
-    interpolation: Interpolation = "auto",
+    path: str | Path, manipulator: Manipulator, interpolation: Interpolation = "auto"
 ) -> Trajectory:
     """Read a trajectory of any origin.
 

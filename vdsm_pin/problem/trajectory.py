@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import (
-    BoolArray,
-    FloatArray,
-    freeze,
-    frozen,
-    same_arrays,
-)
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze, frozen, same_arrays
 from vdsm_pin.geometry.bernstein import derivative, value
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES

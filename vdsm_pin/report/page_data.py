@@ -16,17 +16,9 @@ from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.drawings import drawing_of
 from vdsm_pin.report.impasse import Impasse
 from vdsm_pin.report.reason import failing
-from vdsm_pin.report.thinning import (
-    MOST_DRAWN,
-    nearest_obstacles,
-    thinned,
-)
+from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles, thinned
 from vdsm_pin.report.words import finite
-from vdsm_pin.verification.records import (
-    ClosestApproach,
-    Counterexample,
-    Verification,
-)
+from vdsm_pin.verification.records import ClosestApproach, Counterexample, Verification
 
 
 def closest_data(

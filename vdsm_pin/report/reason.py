@@ -20,12 +20,7 @@ from vdsm_pin.report.words import (
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance_check import LINKS, OBSTACLES
 from vdsm_pin.verification.inside import ARM_OUTSIDE, LINKS_OUTSIDE, surfaces
-from vdsm_pin.verification.records import (
-    ArmVerification,
-    Check,
-    Verdict,
-    Verification,
-)
+from vdsm_pin.verification.records import ArmVerification, Check, Verdict, Verification
 from vdsm_pin.verification.task import ArmPairs
 
 _PASSED: Final = Verdict.CERTIFIED

@@ -84,11 +84,7 @@ class ClearanceCsv:
     """
 
     def __init__(
-        self,
-        path: Path,
-        problem: AnyProblem,
-        n_pairs: int,
-        reach: float = math.inf,
+        self, path: Path, problem: AnyProblem, n_pairs: int, reach: float = math.inf
     ) -> None:
         pose = problem.T_world_base
         self._rotation, self._shift = pose[:3, :3].T, pose[:3, 3]

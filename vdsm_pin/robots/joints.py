@@ -39,10 +39,7 @@ _SINGLE: Final = {
     "continuous": Kind.REVOLUTE,
     "prismatic": Kind.PRISMATIC,
 }
-_SHIFTS: Final = (
-    _Part("/x", Kind.PRISMATIC, X),
-    _Part("/y", Kind.PRISMATIC, Y),
-)
+_SHIFTS: Final = (_Part("/x", Kind.PRISMATIC, X), _Part("/y", Kind.PRISMATIC, Y))
 _SEVERAL: Final[dict[str, tuple[_Part, ...]]] = {
     "planar": (*_SHIFTS, _Part("/theta", Kind.REVOLUTE, Z)),
     "floating": (

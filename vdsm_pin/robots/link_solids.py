@@ -10,11 +10,7 @@ import numpy as np
 
 from vdsm_pin.arm.bodies import covering_points, grouped
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.geometry.arrays import (
-    FloatArray,
-    IntArray,
-    distinct_rows,
-)
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.io.mesh_file import read_mesh

@@ -32,12 +32,7 @@ from vdsm_pin.geometry.solids import (
 )
 from vdsm_pin.problem.scene import Obstacle, solid_of
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.coal_hulls import (
-    CoalBody,
-    coal_parts,
-    placed,
-    swept_polygon,
-)
+from vdsm_pin.verification.coal_hulls import CoalBody, coal_parts, placed, swept_polygon
 
 GROUP: Final = 64
 """Bodies of a cloud that share a ball around them."""
@@ -215,11 +210,7 @@ def new_result() -> Any:
 
 
 def measure(
-    request: Any,
-    geometry: Any,
-    pose: Any,
-    bodies: CoalObstacle,
-    result: Any = None,
+    request: Any, geometry: Any, pose: Any, bodies: CoalObstacle, result: Any = None
 ) -> Measured:
     """Distance between one body and the nearest part of an obstacle.
 

@@ -73,9 +73,7 @@ class CoalLog:
     """
 
     def __init__(
-        self,
-        approaches: Sequence[ClosestApproach] = (),
-        enclosing: Sequence[str] = (),
+        self, approaches: Sequence[ClosestApproach] = (), enclosing: Sequence[str] = ()
     ) -> None:
         self.approaches, self._enclosing = list(approaches), tuple(enclosing)
         self._parts: list[tuple[IntArray, IntArray, FloatArray]] = []

@@ -40,9 +40,7 @@ class Missing:
 
 
 def coal_missing(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    deadline: Deadline = NO_LIMIT,
+    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline = NO_LIMIT
 ) -> tuple[Missing, ...]:
     """Links that miss the required clearance at a row, as Coal measures it.
 

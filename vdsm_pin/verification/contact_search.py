@@ -14,11 +14,7 @@ from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.clearances import least_clearances, with_depths
 from vdsm_pin.verification.contacts import MEETING
-from vdsm_pin.verification.first_contact import (
-    FirstContact,
-    Noted,
-    first_contacts,
-)
+from vdsm_pin.verification.first_contact import FirstContact, Noted, first_contacts
 from vdsm_pin.verification.protocols import AnyMotion
 
 ENOUGH: Final = 1e-6

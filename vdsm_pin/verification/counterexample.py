@@ -213,10 +213,7 @@ def starts(least: LeastClearances, weakest: IntArray, k: int) -> tuple[Moment, .
 
 
 def find_counterexamples(
-    motion: AskedMotion,
-    least: LeastClearances,
-    weakest: IntArray,
-    deadline: Deadline,
+    motion: AskedMotion, least: LeastClearances, weakest: IntArray, deadline: Deadline
 ) -> tuple[Counterexample, ...]:
     """Motions within the errors that miss what the proof left undecided.
 

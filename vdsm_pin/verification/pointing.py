@@ -269,11 +269,7 @@ def _largest(
 
 
 def _look(
-    motion: _Motion,
-    first: IntArray,
-    limit: float,
-    worst: _Worst,
-    deadline: Deadline,
+    motion: _Motion, first: IntArray, limit: float, worst: _Worst, deadline: Deadline
 ) -> None:
     """Bound the angle over some intervals, as narrowly as is wanted."""
     slices = motion.whole()

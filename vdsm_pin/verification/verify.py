@@ -107,8 +107,7 @@ def verify(
     )
     checks = [
         *guarded(
-            fk.NAME,
-            lambda: fk.check_fk(model, problem, trajectory, centres, deadline),
+            fk.NAME, lambda: fk.check_fk(model, problem, trajectory, centres, deadline)
         ),
         *check_limits(problem, trajectory),
         *checks_of_others(problem.scene),
@@ -174,10 +173,7 @@ class _Judgement:
     """
 
     def __init__(
-        self,
-        problem: PlanningProblem,
-        trajectory: Trajectory,
-        deadline: Deadline,
+        self, problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline
     ) -> None:
         self.problem, self.trajectory = problem, trajectory
         self.deadline, self.extras = deadline, BestEffort()

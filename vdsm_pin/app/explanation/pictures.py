@@ -83,9 +83,7 @@ def cross_pictures(
     places = [one.points for one in moved]
     return tuple(
         _cross_picture(
-            moment,
-            one,
-            canvas(moment, VIEWS["y"], [region, one.region], places),
+            moment, one, canvas(moment, VIEWS["y"], [region, one.region], places)
         )
         for one in moved
     )

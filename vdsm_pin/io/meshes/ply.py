@@ -254,8 +254,7 @@ class _Binary:
         self._offset = start + element.count * kind.itemsize
         return {
             one.name: _Column(
-                doubles(table[f"p{k}"]).reshape(-1),
-                np.full(element.count, sizes[k]),
+                doubles(table[f"p{k}"]).reshape(-1), np.full(element.count, sizes[k])
             )
             for k, one in enumerate(element.properties)
         }
