@@ -8,9 +8,14 @@ import numpy as np
 from vdsm_pin.arm.manipulator import FEED, Manipulator
 from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.bodies import new_body
+from vdsm_pin.geometry.bodies import Body, new_body
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
-from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
+from vdsm_pin.geometry.obstacles import (
+    Measuring,
+    box_distance,
+    new_measuring,
+    obstacle_bracket,
+)
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -22,6 +27,16 @@ WHOLE_ARM: Final = slice(None)
 """Every axis."""
 GOAL: Final = TOLERANCES.bracket_gap
 """Width of a bracket at which to stop; [m]."""
+
+
+@compiled
+def _upper_bound(
+    pieces: PackedPieces, obstacle: int, body: Body, work: Measuring
+) -> float:
+    """A proved upper bound of the distance of a body to an obstacle; [m]."""
+    work.out[NORMAL : NORMAL + 3] = 1.0
+    obstacle_bracket(pieces, obstacle, body, GOAL, work)
+    return float(work.out[UPPER])
 
 
 @compiled
@@ -47,10 +62,71 @@ def upper_bounds(
         for o in range(count):
             if clock() > until:
                 return result
-            work.out[NORMAL : NORMAL + 3] = 1.0
-            obstacle_bracket(pieces, o, body, GOAL, work)
-            result[n, o] = work.out[UPPER]
+            result[n, o] = _upper_bound(pieces, o, body, work)
     return result
+
+
+@compiled
+def upper_bounds_to(
+    pieces: PackedPieces, points: FloatArray, obstacles: IntArray, until: float
+) -> FloatArray:
+    """`upper_bounds` of points, each to an obstacle of its own.
+
+    Args:
+        pieces: The scene.
+        points: Shape (n, 3); [m].
+        obstacles: Numbers of obstacles, shape (n,).
+        until: When to stop, by the monotonic clock; [s].
+
+    Returns:
+        Shape (n,), infinite where the time was over; [m].
+    """
+    pieces, result = borrowed(pieces), np.full(points.shape[0], np.inf)
+    body, work = new_body(1, 1, 0), new_measuring()
+    for n in range(points.shape[0]):
+        if clock() > until:
+            return result
+        body.points[0] = points[n]
+        result[n] = _upper_bound(pieces, obstacles[n], body, work)
+    return result
+
+
+@compiled
+def nearest_bounds(
+    pieces: PackedPieces, points: FloatArray, until: float
+) -> tuple[FloatArray, IntArray]:
+    """The least of `upper_bounds` of points, and whose it is.
+
+    Obstacles whose box is farther are left alone.
+
+    Args:
+        pieces: The scene.
+        points: Shape (n, 3); [m].
+        until: When to stop, by the monotonic clock; [s].
+
+    Returns:
+        Shape (n,) each; infinite without obstacles and where the time was over; [m].
+    """
+    pieces, count = borrowed(pieces), pieces.root.size
+    result = np.full(points.shape[0], np.inf)
+    which = np.zeros(points.shape[0], np.int64)
+    boxes = np.zeros(count)
+    body, work = new_body(1, 1, 0), new_measuring()
+    for n in range(points.shape[0]):
+        if count == 0 or clock() > until:
+            return result, which
+        for o in range(count):
+            boxes[o] = box_distance(pieces, pieces.root[o], points[n], points[n])
+        first = int(np.argmin(boxes))
+        body.points[0] = points[n]
+        best, nearest = _upper_bound(pieces, first, body, work), first
+        for o in range(count):
+            if o != first and boxes[o] < best:
+                upper = _upper_bound(pieces, o, body, work)
+                if upper < best:
+                    best, nearest = upper, o
+        result[n], which[n] = best, nearest
+    return result, which
 
 
 def upper_distances(problem: PlanningProblem, segments: FloatArray) -> FloatArray:

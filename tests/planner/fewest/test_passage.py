@@ -13,6 +13,7 @@ from some_slow import few_of
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import CutOff
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
+from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
@@ -23,6 +24,11 @@ from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.impossible.cut_off import FEW_CELLS, MOST_CELLS, cut_off
 from vdsm_pin.planner.impossible.octree import DEPTH, adjoining, places
+from vdsm_pin.planner.upper_clearance import (
+    nearest_bounds,
+    upper_bounds,
+    upper_bounds_to,
+)
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.verification.link_clearance import link_clearance
 
@@ -69,6 +75,35 @@ def test_a_window_lets_the_tip_in_from_the_bodys_width_on(seed: int) -> None:
     for window, answer in ((KEEP - 4e-4, True), (KEEP + 4e-4, False)):
         task = problem(*cage(window, R, centre), start=start, points=tips, closed=False)
         assert cut_off(task, tips).tolist() == [answer, False]
+
+
+def test_the_nearest_of_many_obstacles_is_that_of_all_of_them() -> None:
+    """Oracle: closed forms of boxes and balls, every one of them."""
+    rng = np.random.default_rng(7)
+    centres, half = rng.uniform(-1.0, 1.0, (60, 3)), rng.uniform(0.01, 0.2, (60, 3))
+    turned = rotation_from_rpy(np.array([0.3, -0.5, 0.8]))
+    solids = [
+        Box(f"o{k}", centres[k], turned, half[k])
+        if k % 2
+        else Sphere(f"o{k}", centres[k], half[k, 0])
+        for k in range(60)
+    ]
+    pieces = pack_pieces([solid.pieces for solid in solids])
+    points = rng.uniform(-1.5, 1.5, (200, 3))
+    away = points[:, None] - centres
+    boxes = np.maximum(np.abs(away @ turned) - half, 0.0)
+    balls = np.maximum(np.linalg.norm(away, axis=2) - half[:, 0], 0.0)
+    is_box = np.arange(60) % 2 == 1
+    truth = np.where(is_box, np.linalg.norm(boxes, axis=2), balls)
+    upper, which = nearest_bounds(pieces, points, np.inf)
+    np.testing.assert_allclose(np.maximum(upper, 0.0), truth.min(axis=1), atol=1e-9)
+    to_it = upper_bounds_to(pieces, points, which, np.inf)
+    np.testing.assert_allclose(to_it, upper, atol=1e-9)
+    every = upper_bounds(pieces, np.stack([points, points], axis=1), np.inf)
+    np.testing.assert_allclose(np.maximum(every, 0.0), truth, atol=1e-9)
+    late, _ = nearest_bounds(pieces, points, 0.0)
+    assert np.isinf(late).all()
+    assert np.isinf(upper_bounds_to(pieces, points, which, 0.0)).all()
 
 
 def test_the_tip_of_a_plan_is_never_cut_off() -> None:

@@ -25,7 +25,7 @@ from vdsm_pin.planner.impossible.octree import (
     doubt_to,
     holders,
 )
-from vdsm_pin.planner.upper_clearance import upper_bounds
+from vdsm_pin.planner.upper_clearance import nearest_bounds, upper_bounds_to
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -51,8 +51,8 @@ class _Cells(Octree):
         arm = problem.manipulator
         low, high = arm.base_range
         solids = [obstacle.pieces for obstacle in problem.scene.obstacles]
-        self.pieces = [*(pack_pieces([solid]) for solid in solids), pack_pieces(solids)]
-        self.convex = np.array([len(solid) == 1 for solid in solids], dtype=np.bool_)
+        self.convex = pack_pieces([solid for solid in solids if len(solid) == 1])
+        self.others = pack_pieces([solid for solid in solids if len(solid) != 1])
         # A way may begin and end beside its tips, and keep as much less near them.
         beside = problem.tip_tolerance
         keep = arm.least_radius + problem.required_clearance - beside
@@ -73,19 +73,8 @@ class _Cells(Octree):
         """What its centre has to spare, shape (n,); [m]."""
         return np.asarray(self.known[1])
 
-    def _excess(self, points: FloatArray, obstacle: int = -1) -> FloatArray:
-        """Distances less what a tip must keep, from above; 0 counts inside; [m].
-
-        Args:
-            points: Shape (n, 3); [m].
-            obstacle: Which one; all of them without it.
-
-        Returns:
-            Shape (n, n_obstacles), or (n, 1) of one obstacle.
-        """
-        pieces = self.pieces[obstacle]
-        ends = np.stack([points, points], axis=1)
-        upper = upper_bounds(pieces, ends, self.deadline.end)
+    def _excess(self, upper: FloatArray) -> FloatArray:
+        """Distances, known from above, less what a tip must keep; 0 counts inside."""
         self.deadline.check()
         return np.asarray(np.maximum(upper, 0.0) + self.inside)
 
@@ -94,14 +83,18 @@ class _Cells(Octree):
         centre, half = self.boxes(codes, levels)
         out, inside = self._extent(centre, half)
         radius = np.sqrt(3.0) * half
-        excess = np.full((len(codes), len(self.convex)), np.inf)
-        excess[~out] = self._excess(centre[~out])
-        free = (excess >= radius[:, None]).all(axis=1)
-        shut = out | (excess + radius[:, None] < 0.0).any(axis=1)
-        shut |= self._in_one(centre, half, excess, ~shut)
-        state = np.where(shut, SHUT, np.where(inside & free, OPEN, DOUBTFUL))
-        middle = np.where(out, np.inf, excess.min(axis=1, initial=self.side))
-        return state, middle
+        upper, nearest = nearest_bounds(self.convex, centre[~out], self.deadline.end)
+        other, _ = nearest_bounds(self.others, centre[~out], self.deadline.end)
+        middle = np.full(len(codes), np.inf)
+        middle[~out] = self._excess(np.minimum(upper, other))
+        shut = out | (middle + radius < 0.0)
+        state = np.where(inside & (middle >= radius), OPEN, DOUBTFUL)
+        # Outside a convex solid some corner is farther than the centre by half a side.
+        value = self._excess(upper)
+        worth = ~shut[~out] & ((value + half[~out] < 0.0) | (value <= self.inside))
+        some = np.flatnonzero(~out)[worth]
+        shut[some] = self._in_one(centre[some], half[some], nearest[worth])
+        return np.where(shut, SHUT, state), np.minimum(middle, self.side)
 
     def _extent(self, centre: FloatArray, half: FloatArray) -> tuple[BoolArray, ...]:
         """Whether cells are beyond reach as a whole, and whether within as a whole."""
@@ -114,25 +107,16 @@ class _Cells(Octree):
         return np.asarray(out), np.asarray(inside)
 
     def _in_one(
-        self, centre: FloatArray, half: FloatArray, excess: FloatArray, open_: BoolArray
+        self, centre: FloatArray, half: FloatArray, obstacle: IntArray
     ) -> BoolArray:
-        """Whether all corners of a cell are too close to one convex obstacle.
+        """Whether all corners of cells are too close to one convex obstacle each.
 
         The distance to a convex solid is largest at a corner.
         """
-        shut = np.zeros(len(half), dtype=np.bool_)
-        if not self.convex.any():
-            return shut
-        nearest = np.where(self.convex, excess, np.inf).argmin(axis=1)
-        value = excess[np.arange(len(half)), nearest]
-        # Outside a convex solid some corner is farther than the centre by half a side.
-        worth = open_ & ((value + half < 0.0) | (value <= self.inside))
-        for o in np.flatnonzero(self.convex):
-            near = np.flatnonzero(worth & (nearest == o))
-            corners = centre[near, None] + half[near, None, None] * CORNERS
-            at = self._excess(corners.reshape(-1, 3), int(o))
-            shut[near] = (at.reshape(-1, 8) < 0.0).all(axis=1)
-        return shut
+        corners = (centre[:, None] + half[:, None, None] * CORNERS).reshape(-1, 3)
+        which = np.repeat(obstacle, len(CORNERS))
+        upper = upper_bounds_to(self.convex, corners, which, self.deadline.end)
+        return np.asarray((self._excess(upper).reshape(-1, 8) < 0.0).all(axis=1))
 
     def holders(self, points: FloatArray) -> IntArray:
         """Cells that hold points, shape (n,); -1 outside of all."""
