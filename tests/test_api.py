@@ -204,8 +204,10 @@ def test_no_result_shows_more_clearance_than_is_proved() -> None:
     near = result.closest(1)[0]
     assert repr(near).startswith("ClosestApproach(link ")
     assert "\n" not in repr(near)
-    assert "at least 12.345 mm" in repr(replace(near, lower=0.0123458))
-    assert "at least −0.001 mm" in repr(replace(near, lower=-1e-9))
+    assert ": 12.345 mm to 12.350 mm, nearest at waypoint " in repr(
+        replace(near, lower=0.0123458, upper=0.0123499)
+    )
+    assert ": −0.001 mm to " in repr(replace(near, lower=-1e-9))
     assert result.closest(-1) == ()
 
 

@@ -1,6 +1,8 @@
 """Motions of a planar robot past a post: repaired, or refused with the reason."""
 
 import json
+import math
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -194,6 +196,12 @@ def test_command_writes_what_verify_certifies(tmp_path: Path) -> None:
     ended = CliRunner().invoke(app, given, obj="vdsm repair")
     assert ended.exit_code == 0, ended.output
     assert "✓ certified" in ended.output and "largest change" in ended.output
+    # Both joints turn; the rows of repair.json are in radians.
+    most = re.search(r"largest change +([0-9.]+)°$", ended.output, re.MULTILINE)
+    rows = json.loads((out / "repair.json").read_text())["waypoints"]
+    assert most
+    told = math.radians(float(most[1]))
+    assert told == pytest.approx(max(row["moved"] for row in rows), abs=1e-5)
     moved = json.loads((out / "repair.json").read_text())["waypoints"]
     assert moved[0] == {"given": 0, "moved": 0.0}
     again = ["verify", *common, str(out / "trajectory.csv"), "--out"]

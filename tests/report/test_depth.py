@@ -16,7 +16,7 @@ from vdsm_pin.report.facts import min_clearance, verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.reason import reason
 from vdsm_pin.report.run_record import RunRecord
-from vdsm_pin.report.words import check_cells
+from vdsm_pin.report.words import at_least, at_most, check_cells, kept_at_least
 from vdsm_pin.verification.records import Verification
 from vdsm_pin.verification.verify import verify
 
@@ -72,3 +72,15 @@ def test_a_bound_that_leaves_the_verdict_open_is_no_depth() -> None:
     assert not row.deeper
     told = f"clearance from obstacles is proved to be at least {check_cells(row)[0]} "
     assert told in reason(replace(found, checks=(row,)))
+
+
+def test_a_lower_bound_of_a_depth_is_no_depth_that_was_found() -> None:
+    """The axis lies 0.3 m deep in the box; the most that is measured is the radius."""
+    found = beside_a_box(-0.3)
+    (row, *_) = verification_file(found, RunRecord("vdsm", "p", "0")).closest
+    assert row.deeper
+    assert row.lower_m is not None and row.lower_m < -0.3615
+    assert kept_at_least(row) == at_least(row.lower_m)
+    assert at_most(row.upper_m, row.deeper) == "−61.499 mm or deeper"
+    both = row.model_copy(update={"lower_m": row.upper_m})
+    assert kept_at_least(both).endswith(" mm or deeper")

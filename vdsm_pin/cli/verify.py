@@ -237,10 +237,12 @@ def repair(
         facts = {"waypoints": count, "new": new, "moved_at_most": float(most)}
         answer.tell("", verdict="certified", **facts, folder=out)
         return
-    changed = f"{most:.3f} rad, or m of what slides, at a waypoint"
     show_verification(
         file,
         out,
         ("waypoints", f"{count}, {new} of them new"),
-        ("largest change", changed if new or most else "none: it was clear as given"),
+        (
+            "largest change",
+            found.most if new or most else "none: it was clear as given",
+        ),
     )

@@ -89,6 +89,11 @@ class AnyProblem(Summarised):
                 raise InvalidInput(message)
 
     @property
+    def slides(self) -> bool:
+        """Whether any joint slides, so that its values are lengths."""
+        raise NotImplementedError
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """The files it was read from, the problem or the robot first."""
         return () if self.source is None else self.source.files

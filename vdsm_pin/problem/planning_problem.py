@@ -169,6 +169,12 @@ class PlanningProblem(AnyProblem):
         return HeldApart.of(self.manipulator, self.scene.names)
 
     @property
+    def slides(self) -> bool:
+        """Whether the base does, along the rail."""
+        low, high = self.manipulator.base_range
+        return low < high
+
+    @property
     def path(self) -> DesiredPath:
         """What the tip shall draw, of a problem that says so.
 

@@ -17,7 +17,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MM_PER_M, in_mm
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.records import Verdict, Verification
 
@@ -52,12 +52,21 @@ class Repaired(Summarised, Generic[V]):
     given: IntArray
     moved: FloatArray
 
+    @property
+    def most(self) -> str:
+        """How far the waypoint is moved that is moved most, in words."""
+        most = float(self.moved.max())
+        turned = f"{np.degrees(most):.3f}°"
+        if not self.verification.problem.slides:
+            return turned
+        return f"{turned} of a joint that turns or {in_mm(most)} of one that slides"
+
     def summary(self) -> tuple[tuple[str, str], ...]:
         """What became of the motion, then its verification."""
         new = int((self.given < 0).sum())
         return (
             ("new waypoints", str(new)),
-            ("moved most", f"{self.moved.max():.6g} rad or m"),
+            ("moved most", self.most),
             *self.verification.summary(),
         )
 

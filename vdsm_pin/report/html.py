@@ -37,6 +37,7 @@ from vdsm_pin.report.words import (
     depth,
     errors,
     finite,
+    kept_at_least,
     limit,
     lost,
     mean_count,
@@ -90,7 +91,7 @@ def _environment() -> jinja2.Environment:
     )
     filters = [quantity, depth, at_least, at_most, check_cells, limit, percent,
                errors, outcome, mean_count, measured, survived,
-               lost, counted, term, place, assumption, point, css_text,
+               lost, kept_at_least, counted, term, place, assumption, point, css_text,
                scene_words, sentence]  # fmt: skip
     environment.filters |= {one.__name__: one for one in filters}
     environment.globals |= {

@@ -100,7 +100,9 @@ class ClosestRow(FileModel):
     )
     link_point_m: Point | None = Field(description=f"on the link; {_FRAME}")
     other_point_m: Point | None = Field(description=f"on its partner; {_FRAME}")
-    deeper: bool = Field(description=f"of both bounds: {_DEEPER}")
+    deeper: bool = Field(
+        description=f"of upper_m, of lower_m where both are one: {_DEEPER}"
+    )
     coal_m: FiniteFloat | None = Field(default=None, description=_COAL)
 
 
@@ -114,7 +116,9 @@ class MinClearance(FileModel):
     link: int = Field(description=LINK)
     body: str | None = Field(description=_BODY)
     obstacle: str = Field(description="name of the obstacle")
-    deeper: bool = Field(description=f"of both bounds: {_DEEPER}")
+    deeper: bool = Field(
+        description=f"of upper_m, of lower_m where both are one: {_DEEPER}"
+    )
     coal_m: FiniteFloat | None = Field(default=None, description=_COAL)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypeAlias
 
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 
 MISSING: Final = "not available"
@@ -15,7 +16,7 @@ TIME_LIMIT: Final = "time-limit"
 """The outcome of what the time limit ended."""
 
 if TYPE_CHECKING:
-    from vdsm_pin.report.rows import CheckRow, ErrorBoxRow
+    from vdsm_pin.report.rows import CheckRow, ClosestRow, ErrorBoxRow, MinClearance
     from vdsm_pin.verification.records import Check
 
 Whole: TypeAlias = Callable[[float], int]
@@ -122,6 +123,10 @@ def outcome(word: str) -> Outcome:
     return OUTCOMES.get(word, unknown)
 
 
+_SAME: Final = 10.0 * TOLERANCES.least_bracket
+"""Bounds no farther apart are of one depth; [m]."""
+
+
 def quantity(value: float | None, unit: str, whole: Whole | None = None) -> str:
     """A value with its unit as people read it: mm and degrees.
 
@@ -168,6 +173,17 @@ def at_least(value: float | None, deeper: bool = False) -> str:
 def at_most(value: float | None, deeper: bool = False) -> str:
     """A length that is proved not to be exceeded, rounded up; [m]."""
     return depth(value, deeper, "m", math.ceil)
+
+
+def kept_at_least(row: "ClosestRow | MinClearance") -> str:
+    """What is proved to be kept in a closest approach.
+
+    Of a depth where both bounds are the most that is measured it is said that it may be
+    more; a lower bound by itself is no depth that was found.
+    """
+    lower, upper = row.lower_m, row.upper_m
+    most = lower is None or upper is None or upper - lower <= _SAME
+    return at_least(lower, row.deeper and most)
 
 
 def check_cells(row: "CheckRow | Check") -> tuple[str, str]:

@@ -106,6 +106,11 @@ class Cell(AnyProblem):
         """Refuse errors of what there is not: see `robots.errors.check_errors`."""
         check_errors(self.robot, self.scene, errors)
 
+    @property
+    def slides(self) -> bool:
+        """Whether any joint that moves slides, so that its values are lengths."""
+        return not all(joint.turns for joint in self.robot.joints)
+
     @cached_property
     def asked(self) -> Assembly:
         """What of it is held apart."""

@@ -13,7 +13,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import proved_mm
+from vdsm_pin.units import in_mm, proved_mm
 from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
 from vdsm_pin.verification.coal_rows import CoalRows
 from vdsm_pin.verification.protocols import AnyMotion
@@ -169,9 +169,9 @@ class ClosestApproach:
 
     def __repr__(self) -> str:
         """The pair, what it is proved to keep and where it is nearest, in one line."""
-        kept = f"{proved_mm(self.lower)}{' or deeper' if self.deeper else ''}"
-        words = f"{self.pair}: at least {kept}, nearest at waypoint {self.moment:.6g}"
-        return f"{type(self).__name__}({words})"
+        clearance = f"{proved_mm(self.lower)} to {in_mm(self.upper)}"
+        where = f"nearest at waypoint {self.moment:.6g}"
+        return f"{type(self).__name__}({self.pair}: {clearance}, {where})"
 
 
 @dataclass(frozen=True)

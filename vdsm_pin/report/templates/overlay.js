@@ -153,7 +153,8 @@ class Overlay {
       const tick = [-8 * way[1], 8 * way[0]];
       this.line(colour, 2, [p[0] - tick[0], p[1] - tick[1]], [p[0] + tick[0], p[1] + tick[1]]);
     }
-    const words = lengthText(upper, Math.ceil) + (deeper ? " or deeper" : "") + (nominal ? " without errors" : "");
+    const found = lengthText(upper, Math.ceil); // of two points: it is at most this
+    const words = (deeper ? `${found} or deeper` : `at most ${found}`) + (nominal ? " without errors" : "");
     const middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
     const aside = along[0] >= 0 ? [along[1], -along[0]] : [-along[1], along[0]];
     this.pen.font = FONT;

@@ -275,11 +275,17 @@ class Plot {
     return one.values[k] * (1 - share) + one.values[next] * share;
   }
 
-  text(value) {
+  // A bound is rounded down: no more is told than is proved.
+  text(value, bound = false) {
     if (!Number.isFinite(value)) return "not available";
     const digits = this.chart.whole ? 0 : 2;
-    const text = value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+    const told = bound ? Math.floor(Math.round(value * 1e6) / 1e4) / 1e2 : value;
+    const text = told.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
     return text + this.chart.unit;
+  }
+
+  told(one, time) {
+    return this.text(this.value(one, time), one.step);
   }
 
   cursor(time) {
@@ -287,7 +293,7 @@ class Plot {
     this.rule.setAttribute("x1", x);
     this.rule.setAttribute("x2", x);
     this.chips.forEach((chip, i) => {
-      chip.querySelector("output").textContent = this.text(this.value(this.series[i], time));
+      chip.querySelector("output").textContent = this.told(this.series[i], time);
     });
   }
 
@@ -329,7 +335,7 @@ class Plot {
     const x = this.x(time);
     const level = this.y(best.value);
     const text = this.tip.querySelector("text");
-    text.textContent = `${best.one.name}: ${this.text(best.value)} at ${this.motion.moment(time)}`;
+    text.textContent = `${best.one.name}: ${this.text(best.value, best.one.step)} at ${this.motion.moment(time)}`;
     const width = text.getComputedTextLength() + 12;
     this.tip.querySelector("rect").setAttribute("width", width);
     const left = x + width + 12 > this.right ? x - width - 8 : x + 8;
