@@ -119,6 +119,22 @@ def test_limits_that_are_not_judged_are_told(tmp_path: Path) -> None:
     assert note.startswith("limits of joint 'follow', 2 to 3, are not judged: they")
 
 
+def test_what_was_assumed_is_told(tmp_path: Path) -> None:
+    """Of the robot and of meshes beside it: in this order, and nothing else."""
+    made = Made(tmp_path)
+    write_cube(tmp_path / "block.stl", 100.0)
+    where = {"center": [-900, 900, 1500], "solid": False}
+    mesh = {"name": "block", "shape": "mesh", "file": "block.stl", **where}
+    made.cell["obstacles"].append(mesh)
+    assert [*made.check(made.certified()).notes] == [
+        "hulls of meshes; boxes, cylinders, spheres, capsules as they are",
+        "linear pieces",
+        "4 of 10 link pairs left out",
+        "block is a surface only",
+        "block is taken to be 200 x 200 x 200 mm; no unit is stated",
+    ]
+
+
 @pytest.mark.parametrize("rows", [1, 2])
 def test_motions_of_few_rows_are_accepted_and_held_to_their_rates(
     tmp_path: Path, rows: int
