@@ -24,6 +24,7 @@ from vdsm_pin.report.files import (
     schema,
 )
 from vdsm_pin.report.motion_facts import motion_facts
+from vdsm_pin.report.robot_facts import reached
 from vdsm_pin.verification.records import ArmVerification, Check, Pair, Verdict
 
 
@@ -135,6 +136,32 @@ def test_motion_facts_hold_what_lies_between_rows() -> None:
     assert (facts.x0_min_m, facts.x0_max_m) == pytest.approx((0.0, 0.2))
     expected = 0.1 * np.eye(8)[2]
     np.testing.assert_allclose(facts.max_link_angle_rad, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_motion_facts_are_those_of_the_curve_to_the_last_digit_shown(
+    degree: int,
+) -> None:
+    """Oracle: the curve at 100,001 moments, and its own pieces cut no more."""
+    rng = np.random.default_rng(degree)
+    rates, changes = rng.uniform(-0.4, 0.4, (2, 4, 17))
+    joints, none = rng.uniform(-0.3, 0.3, (4, 17)), np.zeros(4)
+    times = np.array([0.0, 0.7, 1.9, 2.4])
+    motion = Trajectory(
+        none, none, joints[:, 0], joints[:, 1::2], joints[:, 2::2], times=times,
+        rates=rates, changes=changes if degree == 5 else None,
+    )  # fmt: skip
+    facts = motion_facts(made_up.problem(), motion)
+    dense = motion.path.at(np.linspace(0.0, 3.0, 100_001))
+    cosines = np.cos(dense[:, 1::2]) * np.cos(dense[:, 2::2])
+    psi, x0 = np.arccos(cosines).max(axis=0), dense[:, 0]
+    shown = np.array([facts.x0_min_m, facts.x0_max_m, *facts.max_link_angle_rad])
+    true = np.array([x0.min(), x0.max(), *psi])
+    np.testing.assert_allclose(shown, true, rtol=0.0, atol=1e-8)
+    assert (shown[1:] >= true[1:] - 1e-15).all() and shown[0] <= true[0]
+    low, high = reached(motion.path)
+    np.testing.assert_allclose(low, dense.min(axis=0), rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(high, dense.max(axis=0), rtol=0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7])

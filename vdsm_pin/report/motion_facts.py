@@ -1,5 +1,6 @@
 """What the arm does over a motion."""
 
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.rows import MotionFacts
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.drawing import runs
-from vdsm_pin.verification.extremes import rows_along
+from vdsm_pin.verification.extremes import Measure, extremes
 
 _CHUNK: Final = 65_536  # rows treated at once, so that memory stays bounded
 
@@ -27,11 +28,9 @@ def changed_angles(psi: FloatArray) -> IntArray:
 
 def motion_facts(problem: PlanningProblem, trajectory: Trajectory) -> MotionFacts:
     """Extremes over a motion; changed link angles at its rows."""
-    largest, x0 = np.zeros(trajectory.n_links), [np.inf, -np.inf]
-    for rows in rows_along(trajectory.path):
-        psi = link_angles(rows[:, 1::2], rows[:, 2::2])
-        largest = np.maximum(largest, psi.max(axis=0))
-        x0 = [min(x0[0], rows[:, 0].min()), max(x0[1], rows[:, 0].max())]
+    bends = [partial(_link_angle, joint) for joint in range(trajectory.n_links)]
+    ends: list[Measure] = [lambda q: -q[:, :1], lambda q: q[:, :1]]
+    below, above, *largest = extremes(trajectory.path, [*ends, *bends])
     changed = np.zeros(trajectory.n_samples, dtype=np.int64)
     for first in range(0, trajectory.n_samples, _CHUNK):
         part = slice(first, first + _CHUNK)
@@ -42,13 +41,19 @@ def motion_facts(problem: PlanningProblem, trajectory: Trajectory) -> MotionFact
     return MotionFacts(
         waypoints=trajectory.n_samples,
         on_path_waypoints=None if problem.tip_path is None else int(on_path.size),
-        max_link_angle_rad=tuple(float(value) for value in largest),
-        x0_min_m=float(x0[0]),
-        x0_max_m=float(x0[1]),
+        max_link_angle_rad=tuple(largest),
+        x0_min_m=-below,
+        x0_max_m=above,
         changed_angle_threshold_rad=TOLERANCES.changed_angle,
         changed_angles_mean_on_path=mean,
         changed_angles_max=int(changed.max()),
     )
+
+
+def _link_angle(joint: int, q: FloatArray) -> FloatArray:
+    """That of a joint, from 0, in rows of joint values, shape (m, 1); [rad]."""
+    alpha, theta = 2 * joint + 1, 2 * joint + 2
+    return link_angles(q[:, alpha : alpha + 1], q[:, theta : theta + 1])
 
 
 def _mean_by_way(

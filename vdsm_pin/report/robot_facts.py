@@ -1,5 +1,6 @@
 """What verification.json says of a robot of a URDF: joints, links, notes."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from vdsm_pin.report.words import finite
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.robots.model import Robot, RobotJoint
-from vdsm_pin.verification.extremes import rows_along
+from vdsm_pin.verification.extremes import extremes
 from vdsm_pin.verification.inside import mesh_notes
 
 
@@ -69,9 +70,15 @@ def _motion(cell: Cell, path: Path) -> RobotFacts:
 
 def reached(path: Path) -> FloatArray:
     """Least and largest values of all columns over a motion, (2, n_columns)."""
-    ends = [(rows.min(axis=0), rows.max(axis=0)) for rows in rows_along(path)]
-    low, high = np.swapaxes(ends, 0, 1)
-    return np.stack([low.min(axis=0), high.max(axis=0)])
+    columns = range(path.knots.shape[1])
+    signed = [partial(_signed, sign, k) for sign in (-1.0, 1.0) for k in columns]
+    low, high = np.array(extremes(path, signed)).reshape(2, -1)
+    return np.stack([-low, high])
+
+
+def _signed(sign: float, column: int, q: FloatArray) -> FloatArray:
+    """A column of rows of joint values or its negative, shape (m, 1)."""
+    return sign * q[:, column : column + 1]
 
 
 def _joint(joint: RobotJoint, values: FloatArray) -> JointRow:

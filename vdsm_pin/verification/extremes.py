@@ -4,7 +4,7 @@ A measure of joint values is largest at an end of every straight line. So the co
 points of a smooth piece bound it there, and pieces are cut where they do not decide.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import inf, nan
 from typing import Final, TypeAlias
@@ -95,16 +95,18 @@ def cut(controls: FloatArray) -> FloatArray:
     return part(np.repeat(controls, PARTS, axis=0), edges, edges + 1.0 / PARTS)
 
 
-def rows_along(path: Path) -> Iterator[FloatArray]:
-    """Rows all along a motion: those of straight lines, and of parts of smooth pieces.
+def extremes(path: Path, measures: Sequence[Measure]) -> list[float]:
+    """Largest values of some measures over a motion, none too small.
 
-    Shape (m, n_columns) each; the least and the largest of them are those of the motion
-    to a thousandth of a bulge.
+    Args:
+        path: The motion.
+        measures: Of its rows; largest at an end of every straight line.
     """
-    for _, controls in pieces_of(path):
-        smooth = controls.shape[1] > 1
-        yield cut(controls)[:, 0] if smooth else controls[:, 0]
-    yield path.knots[-1:]
+    found = [Largest() for _ in measures]
+    for first, controls in pieces_of(path):  # with no limit that would be enough
+        both = zip(found, measures, strict=True)
+        found = [_with_pieces(one, first, controls, of, nan) for one, of in both]
+    return [one.bound for one in found]
 
 
 def largest(pieces: Pieces, measure: Measure, limit: float) -> Largest:
@@ -113,7 +115,7 @@ def largest(pieces: Pieces, measure: Measure, limit: float) -> Largest:
     Args:
         pieces: Of the motion.
         measure: Of its rows; largest at an end of every straight line.
-        limit: What it is held against.
+        limit: What it is held against; NaN where only the value matters.
     """
     found = Largest()
     for first, controls in pieces:
