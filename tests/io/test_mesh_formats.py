@@ -535,6 +535,27 @@ def test_vertices_that_no_triangle_names_may_be_anything(
         assert len(read_mesh(path).triangles) == 1
 
 
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "notes"),
+    [
+        ("a.ply", PLY, ()),
+        ("a.ply", PLY.replace("face 1", "face 3") + "2 0 1\n0\n",
+         ("faces of less than three corners left out: 2",)),
+        ("a.obj", OBJ, ()),
+        ("a.obj", f"{OBJ}l 1 2\np 1\n", ("lines and points left out: 2",)),
+    ],
+)  # fmt: skip
+def test_what_is_left_out_of_a_mesh_is_told(
+    tmp_path: Path, name: str, text: str, notes: tuple[str, ...]
+) -> None:
+    mesh = read_mesh(write(tmp_path, name, text))
+    assert mesh.notes == notes
+    assert len(mesh.triangles) == 1
+
+
 @pytest.mark.parametrize("kind", ["stl", "ply", "glb"])
 def test_no_triangle_behind_those_announced_is_left_out(
     tmp_path: Path, kind: str

@@ -8,7 +8,7 @@ import math
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_quaternion
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, doubles
@@ -34,11 +34,7 @@ Count = Annotated[int, Field(ge=0, lt=1 << 32)]
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-
-
-class _View(_Model):
+class _View(BaseModel):
     buffer: Count
     byteOffset: Count = 0  # noqa: N815 (glTF's name)
     byteLength: Count  # noqa: N815
@@ -46,7 +42,7 @@ class _View(_Model):
     extensions: dict[str, Any] = {}
 
 
-class _Accessor(_Model):
+class _Accessor(BaseModel):
     bufferView: Count | None = None  # noqa: N815
     byteOffset: Count = 0  # noqa: N815
     componentType: Literal[5120, 5121, 5122, 5123, 5125, 5126]  # noqa: N815
@@ -56,19 +52,19 @@ class _Accessor(_Model):
     sparse: Any = None
 
 
-class _Primitive(_Model):
+class _Primitive(BaseModel):
     attributes: dict[str, Count]
     indices: Count | None = None
     mode: Annotated[int, Field(ge=0, le=6)] = _TRIANGLES
     extensions: dict[str, Any] = {}
 
 
-class _Mesh(_Model):
+class _Mesh(BaseModel):
     primitives: list[_Primitive]
     weights: list[Number] = []
 
 
-class _Node(_Model):
+class _Node(BaseModel):
     children: list[Count] = []
     mesh: Count | None = None
     skin: Count | None = None
@@ -90,15 +86,15 @@ class _Node(_Model):
         return pose
 
 
-class _Buffer(_Model):
+class _Buffer(BaseModel):
     uri: str | None = None
 
 
-class _Scene(_Model):
+class _Scene(BaseModel):
     nodes: list[Count] = []
 
 
-class _Document(_Model):
+class _Document(BaseModel):
     scene: Count | None = None
     scenes: list[_Scene] = []
     nodes: list[_Node] = []
