@@ -211,3 +211,18 @@ def cut_times(path: Path, counts: IntArray) -> FloatArray:
         start, end = path.own_times[k : k + 2]
         found.append(np.linspace(start, end, count + 1)[1:])
     return np.concatenate(found)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_rates_are_of_the_knots(which: int) -> None:
+    knots, times = np.zeros((3, 2)), np.arange(3.0)
+    assert Path.through(knots, times, knots, knots).degree == 5
+    names = "rates", "accelerations"
+    for shape in ((2, 2), (3, 1), (3,)):
+        given = [knots, knots]
+        given[which] = np.zeros(shape)
+        with pytest.raises(ValueError, match=f"{names[which]} have shape"):
+            Path.through(knots, times, *given)
+    for wrong in ([0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 2.0, 1.0], [0.0, 1.0, np.nan]):
+        with pytest.raises(ValueError, match="times"):
+            Path.through(knots, np.array(wrong), knots, knots)

@@ -254,6 +254,8 @@ def test_what_is_not_judged_in_time_is_undecided() -> None:
     ("change", "words"),
     [
         ({"bodies": [ball(5, 0, 0, 0, 1), ball(0, 0, 0, 0, 1)]}, "frame below 3"),
+        ({"bodies": [ball(3, 0, 0, 0, 1), ball(0, 0, 0, 0, 1)]}, "frame below 3"),
+        ({"bodies": [ball(2, 0, 0, 0, 1), ball(-1, 0, 0, 0, 1)]}, "frame below 3"),
         ({"bodies": [Body(2, ()), ball(0, 0, 0, 0, 1)]}, "0 pieces"),
         ({"bodies": [ball(2, 0, 0, 0, 1), ball(2, 1, 0, 0, 1)]}, "ride on one frame"),
         ({"path": Path(np.zeros((2, 2)))}, "the path has 2 columns, the tree 1"),

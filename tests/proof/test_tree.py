@@ -116,6 +116,10 @@ def test_joined_trees_move_as_each_does_alone() -> None:
         (lambda: (Joint(0, placement=2.0 * np.eye(4)),), "no rigid motion"),
         (lambda: (Joint(0, placement=np.diag([1.0, 1, -1, 1])),), "no rigid motion"),
         (lambda: (Joint(0, ratio=np.inf),), "finite"),
+        (lambda: (Joint(0, offset=np.nan),), "finite"),
+        (lambda: (Joint(0), Joint(-1)), "frame 2 and hangs on frame -1"),
+        (lambda: (Joint(0), Joint(2)), "expected one from 0 to 1"),
+        (lambda: (Joint(0, column=0), Joint(1, column=2)), r"are \[0, 2\], expected"),
     ],
 )
 def test_what_is_no_tree_is_refused(joints: object, words: str) -> None:

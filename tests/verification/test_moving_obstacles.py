@@ -13,6 +13,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.coal_arm import SPREAD, CoalArm
+from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.verify import verify
 
@@ -411,3 +412,20 @@ def test_coal_measures_what_moves_at_rows_all_over(n: int, tmp_path: Path) -> No
     np.testing.assert_allclose(distance, off - 0.09, atol=1e-9)
     assert all((one.lower == -np.inf).all() for one in found)
     assert all((one.upper == np.inf).all() for one in found)
+
+
+def test_beside_what_moves_rows_have_times_and_nothing_is_planned(
+    tmp_path: Path,
+) -> None:
+    ball = (
+        "  - {name: ball, shape: sphere, center: [0, 0, 0], radius: 10, "
+        "motion: {times_s: [0, 1], positions: [[0, 900, 0], [0, 950, 0]]}}\n"
+    )
+    problem, rows = problem_of(tmp_path / "p.yaml", ball), np.zeros((2, 7))
+    judged(problem, motion_of(rows, np.arange(2.0)))
+    none = np.zeros(2)
+    untimed = Trajectory(none > 0, none, none, rows[:, 1::2], rows[:, 2::2])
+    with pytest.raises(InvalidInput, match="no column 'time_s', but obstacle 'ball'"):
+        judged(problem, untimed)
+    with pytest.raises(InvalidInput, match="obstacle 'ball' moves: no motion is plan"):
+        link_clearance(problem)
