@@ -32,7 +32,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.records import ArmVerification
-from vdsm_pin.verification.task import all_pairs
+from vdsm_pin.verification.records import Pair as NamedPair
 
 
 def write_certificate(
@@ -63,8 +63,9 @@ def write_certificate(
     motion = AskedMotion.of_arm(hulled, trajectory, verification.errors)
     proving = motion.proving(Budget(until=deadline.end))
     places = motion.question.places[len(motion.asked.own) :]
-    header = _header(verification, hashes, proving.task.pieces, places)
-    whole = np.zeros(len(proving.task.pieces.root), np.int64)
+    pieces = proving.task.pieces
+    header = _header(verification, hashes, motion.asked.pairs, pieces, places)
+    whole = np.zeros(len(pieces.root), np.int64)
     for place, one in zip(places, problem.scene.obstacles, strict=True):
         whole[place] = len(one.pieces) if one.name in hulls else 0
     proof = Recorded(proving.task, proving.motion, whole)
@@ -74,6 +75,7 @@ def write_certificate(
 def _header(
     verification: ArmVerification,
     hashes: Hashes,
+    pairs: Sequence[NamedPair],
     pieces: PackedPieces,
     places: Sequence[int],
 ) -> HeaderLine:
@@ -88,7 +90,7 @@ def _header(
             **errors_beside(box, problem.scene),
         ),
         interpolation=trajectory.interpolation,
-        pairs=_pairs(problem),
+        pairs=_pairs(pairs),
         pieces=pieces_of_obstacles(obstacles, pieces) | _pieces_carried(problem),
         joined=joined_corners(problem.scene),
         links=links_of_others(obstacles, pieces),
@@ -104,11 +106,11 @@ def errors_beside(errors: ErrorBox, scene: Scene) -> dict[str, Any]:
     }
 
 
-def _pairs(problem: PlanningProblem) -> list[Pair]:
+def _pairs(pairs: Sequence[NamedPair]) -> list[Pair]:
     """The moving body of each pair and what it is proved clear of."""
     return [
         (pair.own, pair.obstacle) if pair.obstacle else (pair.label, pair.own)
-        for pair in all_pairs(problem)
+        for pair in pairs
     ]
 
 

@@ -53,12 +53,15 @@ class BestEffort:
 
 
 def guarded(
-    name: str, run: Callable[[], Check | tuple[Check, ...]]
+    name: str,
+    run: Callable[P, Check | tuple[Check, ...]],
+    *args: P.args,
+    **kw: P.kwargs,
 ) -> tuple[Check, ...]:
     """A check's rows; one undecided row if it raises a domain or arithmetic error."""
     step("%s", name)
     try:
-        rows = run()
+        rows = run(*args, **kw)
     except (VdsmError, ArithmeticError) as error:
         return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not done: {error}"),)
     return rows if isinstance(rows, tuple) else (rows,)

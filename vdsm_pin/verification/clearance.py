@@ -189,6 +189,18 @@ def prove_clearance(
         The proof, its least brackets narrowed unless the time ended before.
     """
     motion = AskedMotion.of_arm(problem, trajectory, errors)
+    return prove_motion(problem, trajectory, motion, sinks, deadline, reach)
+
+
+def prove_motion(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    motion: AskedMotion,
+    sinks: Sequence[ClearanceSink],
+    deadline: Deadline,
+    reach: float,
+) -> ClearanceProof:
+    """`prove_clearance` of what is asked already."""
     proving = motion.proving(Budget(until=deadline.end))
     step("proving the clearance of %d pairs", motion.question.n_pairs)
     with watched(lambda: proving.share):

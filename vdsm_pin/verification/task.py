@@ -11,7 +11,6 @@ from vdsm_pin.problem.held import held_pairs
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.bodies import Body, LeftOut, PairTable
 from vdsm_pin.verification.assembly import Assembly
-from vdsm_pin.verification.records import Pair
 
 
 class ArmPairs:
@@ -79,8 +78,3 @@ def arm_assembly(problem: PlanningProblem) -> Assembly:
         column_errors=lambda errors: np.append(0.0, errors.angles(arm.n_links)),
         packed=problem.packed,
     )
-
-
-def all_pairs(problem: PlanningProblem) -> tuple[Pair, ...]:
-    """Every pair that is judged, in the order of the certificate."""
-    return arm_assembly(problem).pairs

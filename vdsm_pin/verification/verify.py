@@ -17,9 +17,10 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.approaches import closest_approaches
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.best_effort import BestEffort, guarded
 from vdsm_pin.verification.brackets import ClearanceSink
-from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.coal_arm import coal_reach
 from vdsm_pin.verification.coal_check import COAL, CoalLog, check_coal
@@ -32,7 +33,7 @@ from vdsm_pin.verification.enclosed import (
     enclosed_profile,
     pairs_inside,
 )
-from vdsm_pin.verification.first_contact import FirstContact, Noted, TooClose
+from vdsm_pin.verification.first_contact import Noted, TooClose
 from vdsm_pin.verification.inside import (
     arm_inside,
     bodies_inside,
@@ -45,9 +46,9 @@ from vdsm_pin.verification.limits import check_limits, checks_of_others
 from vdsm_pin.verification.moving import check_timed
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
-from vdsm_pin.verification.records import ArmVerification, Check, Counterexample, Pair
+from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
-from vdsm_pin.verification.task import ArmPairs, all_pairs
+from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.tip import check_tip
 from vdsm_pin.verification.yes_or_no import is_certified
 
@@ -85,48 +86,44 @@ def verify(
     """
     _check_input(problem, trajectory)
     model, box = load_arm(problem.manipulator), problem.errors
-    reach = coal_reach(problem) if reach is None else reach
     located = locate_arm(problem, trajectory, box, deadline)
     enclosed = bodies_inside(problem, trajectory, arm_inside(located))
-    judgement = _Judgement(problem, trajectory, deadline)
-    pairs = all_pairs(problem)
-    inside = pairs_inside(problem, pairs, enclosed)
-    proved = judgement.proved(pairs, inside, sinks, reach)
-    proof = proved.proof
+    motion = AskedMotion.of_arm(problem, trajectory, box)
+    inside = pairs_inside(problem, motion.asked.pairs, enclosed)
+    reach = coal_reach(problem) if reach is None else reach
+    proved = _proved(problem, trajectory, motion, inside, sinks, deadline, reach)
+    proof, extras = proved.proof, BestEffort()
     least = enclosed_least(proof.least, inside)
-    counterexamples = judgement.counterexamples(proof)
-    clear = bool(counterexamples) and judgement.is_nominally_clear()
-    contacts = judgement.contacts(proved)
-    if sinks and proof.sent < proof.motion.n_intervals:
-        judgement.extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
+    name = "search for counterexamples"
+    counterexamples = extras.take(name, (), proof.counterexamples, deadline)
+    name, asked = "proof of the motion without errors", (problem, trajectory, deadline)
+    clear = bool(counterexamples) and extras.take(name, False, _is_clear, *asked)
+    about = problem, trajectory, motion, proof.least, deadline, proved.too_close
+    contacts = extras.take("first contact", (), contacts_of, *about)
+    if sinks and proof.sent < motion.n_intervals:
+        extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
-    near_misses = closest_approaches(problem, trajectory, proof.motion.asked, least)
+    near_misses = closest_approaches(problem, trajectory, motion.asked, least)
     log = CoalLog(near_misses, tuple(enclosed))
     clearance = check_clearance(
         problem, proof, counterexamples, contacts, deadline, nominal=clear
     )
     checks = [
-        *guarded(
-            fk.NAME, lambda: fk.check_fk(model, problem, trajectory, centres, deadline)
-        ),
+        *guarded(fk.NAME, fk.check_fk, model, problem, trajectory, centres, deadline),
         *check_limits(problem, trajectory),
         *checks_of_others(problem.scene),
         *tip.checks,
-        *guarded(
-            pointing.NAME,
-            lambda: pointing.check_pointing(problem, trajectory, deadline, box),
-        ),
+        *guarded(pointing.NAME, pointing.check_pointing, *asked, box),
         *check_inside(located),
         *enclosed_checks(
             clearance, enclosed, (one.clearance for one in inside.values())
         ),
-        *judgement.by_coal(proved.lowers, log),
-        *guarded(
-            cable_check.NAME,
-            lambda: cable_check.check_cables(problem, trajectory, deadline),
-        ),
+        *guarded(COAL, check_coal, problem, trajectory, proved.lowers, log, deadline),
+        *guarded(cable_check.NAME, cable_check.check_cables, *asked),
     ]
-    survived = judgement.survived(proof, located) if joint_error else (nan, nan)
+    survived = nan, nan
+    if joint_error:
+        survived = _survived(problem, trajectory, proof, located, extras, deadline)
     return ArmVerification(
         problem=problem,
         trajectory=trajectory,
@@ -141,7 +138,7 @@ def verify(
         refuted_joint_error=survived[1],
         counterexamples=counterexamples,
         nominal_clear=clear,
-        not_done=tuple(judgement.extras.not_done),
+        not_done=tuple(extras.not_done),
         time_limit=deadline.limit,
         least=least,
         coal=log.rows(),
@@ -163,103 +160,68 @@ class _Proved:
     too_close: Noted | None
 
 
-class _Judgement:
-    """Works out what `verify` returns of one motion, and notes what time left out.
+def _proved(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    motion: AskedMotion,
+    inside: Mapping[int, Inside],
+    sinks: Sequence[ClearanceSink],
+    deadline: Deadline,
+    reach: float,
+) -> _Proved:
+    """The clearance of every pair; `sinks` and `reach` are those of `verify`."""
+    pairs = motion.asked.pairs
+    wanted = [EnclosedSink(one, pairs, inside) if inside else one for one in sinks]
+    lowers = LowersSink(problem, trajectory)
+    noted = TooClose(pairs, motion.n_intervals)
+    if sinks or lowers.fits:
+        wanted += [lowers.keep, noted]
+    reach = math.inf if inside else reach
+    proof = prove_motion(problem, trajectory, motion, wanted, deadline, reach)
+    proof = proof.with_meetings(deadline)
+    too_close = noted.noted if proof.sent == motion.n_intervals else None
+    return _Proved(proof, lowers.proved(proof), too_close)
 
-    Args:
-        problem: Arm, scene, required clearances.
-        trajectory: The motion.
-        deadline: When to give up what is left.
+
+def _is_clear(
+    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline
+) -> bool:
+    """Whether the motion without errors is proved clear of everything."""
+    motion = problem, trajectory, ErrorBox(), deadline
+    outside = all(one.side is Side.OUTSIDE for one in locate_arm(*motion).values())
+    return outside and is_certified(*motion)
+
+
+def _survived(
+    problem: PlanningProblem,
+    motion: Trajectory,
+    proof: ClearanceProof,
+    located: Mapping[str, Location],
+    extras: BestEffort,
+    deadline: Deadline,
+) -> tuple[float, float]:
+    """The largest joint error that is certified, and the least refuted one; [rad].
+
+    Each is NaN where the time was over; 0 and NaN for an arm that may be inside a mesh.
+    Where the inside of a mesh cannot be told, its hull stands for it in what is
+    certified, and the mesh itself in what is refuted.
     """
-
-    def __init__(
-        self, problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline
-    ) -> None:
-        self.problem, self.trajectory = problem, trajectory
-        self.deadline, self.extras = deadline, BestEffort()
-
-    def proved(
-        self,
-        pairs: Sequence[Pair],
-        inside: Mapping[int, Inside],
-        sinks: Sequence[ClearanceSink],
-        reach: float,
-    ) -> _Proved:
-        """The clearance of every pair; `sinks` and `reach` are those of `verify`."""
-        problem, trajectory = self.problem, self.trajectory
-        wanted = [EnclosedSink(one, pairs, inside) if inside else one for one in sinks]
-        lowers = LowersSink(problem, trajectory)
-        noted = TooClose(pairs, max(1, trajectory.n_samples - 1))
-        if sinks or lowers.fits:
-            wanted += [lowers.keep, noted]
-        proof = prove_clearance(
-            problem,
-            trajectory,
-            self.problem.errors,
-            wanted,
-            deadline=self.deadline,
-            reach=math.inf if inside else reach,
-        )
-        proof = proof.with_meetings(self.deadline)
-        whole = proof.sent == proof.motion.n_intervals
-        too_close = noted.noted if whole else None
-        return _Proved(proof, lowers.proved(proof), too_close)
-
-    def counterexamples(self, proof: ClearanceProof) -> tuple[Counterexample, ...]:
-        """Motions within the errors that come too close."""
-        name = "search for counterexamples"
-        return self.extras.take(name, (), proof.counterexamples, self.deadline)
-
-    def is_nominally_clear(self) -> bool:
-        """Whether the motion without errors is proved clear of everything."""
-        motion = self.problem, self.trajectory, ErrorBox(), self.deadline
-
-        def is_clear() -> bool:
-            located = locate_arm(*motion)
-            outside = all(one.side is Side.OUTSIDE for one in located.values())
-            return outside and is_certified(*motion)
-
-        name = "proof of the motion without errors"
-        return self.extras.take(name, False, is_clear)
-
-    def contacts(self, proved: _Proved) -> tuple[FirstContact, ...]:
-        """When pairs first come too close."""
-        motion, least = proved.proof.motion, proved.proof.least
-        asked = self.problem, self.trajectory, motion, least, self.deadline
-        name = "first contact"
-        return self.extras.take(name, (), contacts_of, *asked, proved.too_close)
-
-    def by_coal(self, lowers: ProvedLowers, log: CoalLog) -> tuple[Check, ...]:
-        """The second opinion on distances."""
-        motion = self.problem, self.trajectory, lowers, log, self.deadline
-        return guarded(COAL, lambda: check_coal(*motion))
-
-    def survived(
-        self, proof: ClearanceProof, located: Mapping[str, Location]
-    ) -> tuple[float, float]:
-        """The largest joint error that is certified, and the least refuted one; [rad].
-
-        Each is NaN where the time was over; 0 and NaN for an arm that may be inside a
-        mesh. Where the inside of a mesh cannot be told, its hull stands for it in what
-        is certified, and the mesh itself in what is refuted.
-        """
-        if any(where.side is not Side.OUTSIDE for where in located.values()):
-            return 0.0, nan
-        problem, motion, errors = self.problem, self.trajectory, self.problem.errors
-        hulls, hulled = unlocated(locate_start(problem, motion)), problem
-        if hulls:  # else with what the problem keeps packed
-            hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
-        lower = np.append(proof.least.lower, np.inf)  # -1 is no pair
-        least = lower[ArmPairs(problem).number].min(axis=0)
-        least[[name in hulls for name in problem.scene.names]] = -math.inf
-        known, take = (self.deadline, least), self.extras.take
-        asked = hulled, motion, errors, *known
-        largest = take("largest joint error", nan, largest_joint_error, *asked)
-        if np.isnan(largest):
-            return nan, nan
-        name = "joint error that loses the clearance"
-        more = problem, motion, errors, largest, *known
-        return largest, take(name, nan, refuted_joint_error, *more)
+    if any(where.side is not Side.OUTSIDE for where in located.values()):
+        return 0.0, nan
+    hulls, hulled = unlocated(locate_start(problem, motion)), problem
+    if hulls:  # else with what the problem keeps packed
+        hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
+    lower = np.append(proof.least.lower, np.inf)  # -1 is no pair
+    least = lower[ArmPairs(problem).number].min(axis=0)
+    least[[name in hulls for name in problem.scene.names]] = -math.inf
+    errors, known = problem.errors, (deadline, least)
+    asked, name = (hulled, motion, errors, *known), "largest joint error"
+    largest = extras.take(name, nan, largest_joint_error, *asked)
+    if np.isnan(largest):
+        return nan, nan
+    name, more = "joint error that loses the clearance", (largest, *known)
+    found = extras.take(name, nan, refuted_joint_error, problem, motion, errors, *more)
+    return largest, found
 
 
 def _check_input(problem: PlanningProblem, trajectory: Trajectory) -> None:
