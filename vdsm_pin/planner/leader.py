@@ -63,13 +63,7 @@ def plan_follow_the_leader(
         parts *= 2
     trajectory = Trajectory(on_path, along, centres[:, 0, 0], alpha, theta)
     note = "the arm follows the curve of its tip; obstacles were not looked at"
-    return Plan(
-        problem,
-        "follow-the-leader",
-        centres,
-        trajectory,
-        notes=(note,),
-    )
+    return Plan(problem, "follow-the-leader", centres, trajectory, notes=(note,))
 
 
 def _check_rail(

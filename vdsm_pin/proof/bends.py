@@ -57,13 +57,7 @@ def stay(ways: Ways, bends: Bends, way: int) -> None:
 
 @compiled
 def bend_between(
-    task: Task,
-    motion: Motion,
-    bends: Bends,
-    way: int,
-    k: int,
-    start: float,
-    end: float,
+    task: Task, motion: Motion, bends: Bends, way: int, k: int, start: float, end: float
 ) -> None:
     """Bound how the frames along one way move over a slice of interval k.
 

@@ -19,12 +19,7 @@ from vdsm_pin.proof.terms import Task, finer
 
 @compiled
 def body_box(
-    task: Task,
-    rows: Rows,
-    count: int,
-    pair: int,
-    low: FloatArray,
-    high: FloatArray,
+    task: Task, rows: Rows, count: int, pair: int, low: FloatArray, high: FloatArray
 ) -> None:
     """Box of a body's core over a block and the error box, shape (3,) each; [m].
 

@@ -13,21 +13,12 @@ from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import Measuring, obstacle_bracket
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
-from vdsm_pin.proof.far_pairs import (
-    BroadPhase,
-    dense_far,
-    keep_least,
-    profile_far,
-)
+from vdsm_pin.proof.far_pairs import BroadPhase, dense_far, keep_least, profile_far
 from vdsm_pin.proof.pair_sweep import Stretch
 from vdsm_pin.proof.plane_bounds import place_disc
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import seen
-from vdsm_pin.proof.terms import (
-    ACROSS,
-    Task,
-    finer,
-)
+from vdsm_pin.proof.terms import ACROSS, Task, finer
 from vdsm_pin.proof.workspace import Workspace, load_rows
 
 FEW: Final = 8
@@ -94,11 +85,7 @@ def _settle_body(
 
 @compiled
 def settle_far(
-    task: Task,
-    work: Workspace,
-    results: Results,
-    broad: BroadPhase,
-    stretch: Stretch,
+    task: Task, work: Workspace, results: Results, broad: BroadPhase, stretch: Stretch
 ) -> int:
     """Record the pairs that are far over a block and list the others.
 

@@ -13,14 +13,9 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.cached_clearances import raise_to_held
 from vdsm_pin.proof.error_growth import grow_corners, set_direction
-from vdsm_pin.proof.layouts import (
-    HELD_CLEARANCE,
-    WIDTH,
-)
+from vdsm_pin.proof.layouts import HELD_CLEARANCE, WIDTH
 from vdsm_pin.proof.plane_bounds import Runs, bound_above, bound_below, take_disc
-from vdsm_pin.proof.rows import (
-    Rows,
-)
+from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.terms import Mover, Task
 
 
@@ -93,12 +88,7 @@ def _grow(
 
 @compiled
 def try_plane(
-    task: Task,
-    mover: Mover,
-    rows: Rows,
-    runs: Runs,
-    plane: FloatArray,
-    demand: Demand,
+    task: Task, mover: Mover, rows: Rows, runs: Runs, plane: FloatArray, demand: Demand
 ) -> int:
     """Bound intervals with a pair's cached plane and witness.
 

@@ -7,15 +7,7 @@ import numpy as np
 
 from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.proof.layouts import (
-    AT_LOWER,
-    AT_UPPER,
-    LOW,
-    OTHER,
-    OWN,
-    TIME,
-    UP,
-)
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.proof.motions import Motion, interpolate
 from vdsm_pin.proof.packed_tree import place_two
 from vdsm_pin.proof.results import Dense, Results

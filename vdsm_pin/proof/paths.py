@@ -8,13 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import (
-    FloatArray,
-    IntArray,
-    freeze,
-    frozen,
-    same_arrays,
-)
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, freeze, frozen, same_arrays
 from vdsm_pin.geometry.bernstein import hermite, part, raised, value
 from vdsm_pin.proof.motions import Motion
 

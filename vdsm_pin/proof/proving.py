@@ -8,13 +8,7 @@ import numpy as np
 from vdsm_pin.proof.blocks import judge, sweep
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.far_pairs import BroadPhase, new_broad_phase
-from vdsm_pin.proof.layouts import (
-    AT_LOWER,
-    AT_UPPER,
-    BEST,
-    TALLY,
-    TIME,
-)
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.results import Candidates, Dense, Results
 from vdsm_pin.proof.rows import BLOCK

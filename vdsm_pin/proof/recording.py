@@ -136,11 +136,7 @@ def _write_ranges(
 
 @compiled
 def _write_slice(
-    slicing: Slicing,
-    work: Workspace,
-    row: FloatArray,
-    records: FloatArray,
-    count: int,
+    slicing: Slicing, work: Workspace, row: FloatArray, records: FloatArray, count: int
 ) -> int:
     """Write the planes of one slice; returns the new count, -1 without room.
 
@@ -163,11 +159,7 @@ def _write_slice(
 
 @compiled
 def _record_pair(
-    slicing: Slicing,
-    work: Workspace,
-    row: FloatArray,
-    records: FloatArray,
-    count: int,
+    slicing: Slicing, work: Workspace, row: FloatArray, records: FloatArray, count: int
 ) -> tuple[int, bool]:
     """Write the planes of one pair over one interval.
 

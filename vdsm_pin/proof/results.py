@@ -6,16 +6,7 @@ import numpy as np
 
 from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.proof.layouts import (
-    AT_LOWER,
-    AT_UPPER,
-    HELD,
-    LOST,
-    LOW,
-    OWN,
-    TIME,
-    UP,
-)
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, HELD, LOST, LOW, OWN, TIME, UP
 from vdsm_pin.proof.plane_bounds import Runs
 from vdsm_pin.proof.terms import UNDECIDED, Task
 
@@ -104,12 +95,7 @@ def _least(values: FloatArray) -> int:
 
 @compiled
 def note_upper(
-    best: FloatArray,
-    runs: Runs,
-    points: FloatArray,
-    start: int,
-    first: int,
-    last: int,
+    best: FloatArray, runs: Runs, points: FloatArray, start: int, first: int, last: int
 ) -> None:
     """Keep the least upper bound of intervals that one witness bounds.
 

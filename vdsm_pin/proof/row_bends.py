@@ -42,10 +42,7 @@ def bound_joints(
 
 @compiled
 def _add_shift(
-    lever: float,
-    turn: FloatArray,
-    before: FloatArray,
-    out: FloatArray,
+    lever: float, turn: FloatArray, before: FloatArray, out: FloatArray
 ) -> None:
     """Out = before + lever turn^2, row by row."""
     for r in range(out.size):
@@ -54,12 +51,7 @@ def _add_shift(
 
 @compiled
 def bend_way(
-    tree: PackedTree,
-    ways: Ways,
-    rows: Rows,
-    way: int,
-    count: int,
-    straight: bool,
+    tree: PackedTree, ways: Ways, rows: Rows, way: int, count: int, straight: bool
 ) -> None:
     """M and W of a way, from those of the way before it."""
     apart()
@@ -97,12 +89,7 @@ def bend_way(
 
 @compiled
 def drift_way(
-    tree: PackedTree,
-    ways: Ways,
-    erring: FloatArray,
-    rows: Rows,
-    way: int,
-    count: int,
+    tree: PackedTree, ways: Ways, erring: FloatArray, rows: Rows, way: int, count: int
 ) -> None:
     """D of a way, from that of the way before it and from W."""
     apart()

@@ -94,11 +94,7 @@ def new_rows(n_frames: int, n_ways: int, tracks: Tracks, block: int) -> Rows:
 
 @compiled
 def blend(
-    x: FloatArray,
-    y: FloatArray,
-    z: FloatArray,
-    at: FloatArray,
-    out: FloatArray,
+    x: FloatArray, y: FloatArray, z: FloatArray, at: FloatArray, out: FloatArray
 ) -> None:
     """Out = at[0] x + at[1] y + at[2] z, row by row."""
     a, b, c = at[0], at[1], at[2]

@@ -25,14 +25,7 @@ from vdsm_pin.proof.motions import Motion, interpolate
 from vdsm_pin.proof.packed_tree import place_two
 from vdsm_pin.proof.slices import Space, slice_bound
 from vdsm_pin.proof.swept_bodies import Ends, to_body
-from vdsm_pin.proof.terms import (
-    CERTIFIED,
-    REFUTED,
-    UNDECIDED,
-    Task,
-    finer,
-    mover_of,
-)
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED, Task, finer, mover_of
 
 SHORTEST: Final = 2.0**-30
 """Shortest slice, in parts of an interval."""
@@ -142,11 +135,7 @@ def place_pair(slicing: Slicing, row: FloatArray) -> None:
 
 
 @compiled
-def _bound_towards(
-    slicing: Slicing,
-    row: FloatArray,
-    aim: float,
-) -> bool:
+def _bound_towards(slicing: Slicing, row: FloatArray, aim: float) -> bool:
     """Bound a slice by the roughest version of its pair that shows if it is enough.
 
     Args:
@@ -175,12 +164,7 @@ def _bound_towards(
 
 
 @compiled
-def examine(
-    slicing: Slicing,
-    row: FloatArray,
-    t: float,
-    witness: Witness,
-) -> None:
+def examine(slicing: Slicing, row: FloatArray, t: float, witness: Witness) -> None:
     """Look at one instant of a slice's interval; keeps the least upper bound.
 
     It is as low as can be where that is news: below the least one known.
@@ -206,11 +190,7 @@ def examine(
 
 @compiled
 def split(
-    slicing: Slicing,
-    row: FloatArray,
-    heap: FloatArray,
-    count: int,
-    aim: float,
+    slicing: Slicing, row: FloatArray, heap: FloatArray, count: int, aim: float
 ) -> int:
     """Push the two halves of a slice; returns the new count of the heap.
 
@@ -232,10 +212,7 @@ def split(
 
 @compiled
 def resolve(
-    slicing: Slicing,
-    heap: FloatArray,
-    row: FloatArray,
-    witness: Witness,
+    slicing: Slicing, heap: FloatArray, row: FloatArray, witness: Witness
 ) -> tuple[int, int]:
     """Decide one pair over one slice of an interval.
 
@@ -287,10 +264,7 @@ def resolve(
 
 @compiled
 def tighten(
-    slicing: Slicing,
-    heap: FloatArray,
-    count: int,
-    witnesses: Witnesses,
+    slicing: Slicing, heap: FloatArray, count: int, witnesses: Witnesses
 ) -> int:
     """Split the slices of the least bounds until the bracket of the least is narrow.
 

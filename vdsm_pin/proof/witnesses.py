@@ -30,11 +30,7 @@ def _nearest_on_axis(
 
 @compiled
 def witness_at(
-    mover: Mover,
-    pose: Pose,
-    points: FloatArray,
-    own: FloatArray,
-    other: FloatArray,
+    mover: Mover, pose: Pose, points: FloatArray, own: FloatArray, other: FloatArray
 ) -> None:
     """Surface points of a body and of its partner, in the world's frame.
 

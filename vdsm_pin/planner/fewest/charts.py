@@ -41,10 +41,7 @@ def coordinates(arm: Manipulator, centres: FloatArray, directed: bool) -> FloatA
 
 
 def mutated(
-    arm: Manipulator,
-    shapes: FloatArray,
-    moved: FloatArray,
-    rng: np.random.Generator,
+    arm: Manipulator, shapes: FloatArray, moved: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
     """Children of arms, one each; see `mutated_offsets` and `mutated_directions`.
 

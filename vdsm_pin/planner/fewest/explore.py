@@ -26,11 +26,7 @@ from vdsm_pin.planner.fewest.levels import (
     Search,
     confined_first,
 )
-from vdsm_pin.planner.fewest.roadmap import (
-    CostWeights,
-    Roadmap,
-    build_roadmap,
-)
+from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, rolled, tip_route
 from vdsm_pin.planner.fewest.search import Found, Searched, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes

@@ -102,11 +102,7 @@ def bow_bounds(centres: FloatArray, next_centres: FloatArray, bows: FloatArray) 
 
 @compiled
 def parts_of_pieces(
-    parts: "Parts",
-    knees: BoolArray,
-    need: FloatArray,
-    finest: float,
-    long_way: float,
+    parts: "Parts", knees: BoolArray, need: FloatArray, finest: float, long_way: float
 ) -> IntArray:
     """Into how many parts to cut the way of a piece to see that it is clear.
 

@@ -292,11 +292,7 @@ class Judge:
         return good, begin
 
     def _within(
-        self,
-        intervals: Intervals,
-        begin: FloatArray,
-        end: FloatArray,
-        most: FloatArray,
+        self, intervals: Intervals, begin: FloatArray, end: FloatArray, most: FloatArray
     ) -> BoolArray:
         """Whether intervals whose ends keep rail and cone keep them in between.
 

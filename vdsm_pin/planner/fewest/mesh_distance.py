@@ -102,12 +102,7 @@ class Surfaces:
             return np.full(len(ends), np.inf)
         reach = enough + STEP
         bound = nearest_triangles(
-            self.triangles,
-            self.groups,
-            ends,
-            floor,
-            reach,
-            deadline.end,
+            self.triangles, self.groups, ends, floor, reach, deadline.end
         )
         deadline.check()
         bound -= STEP

@@ -224,10 +224,7 @@ def _beside(
     number = np.arange(len(flat)).reshape(*counts)
     pairs = [
         (n + int(a), int(b))
-        for one, other in (
-            (number[:-1], number[1:]),
-            (number[:, :-1], number[:, 1:]),
-        )
+        for one, other in ((number[:-1], number[1:]), (number[:, :-1], number[:, 1:]))
         for a, b in zip(one.ravel(), other.ravel(), strict=True)
     ]
     for foot in (*range(0, n - 1, SHEET_STRIDE), n - 1):

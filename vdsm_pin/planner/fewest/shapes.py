@@ -82,11 +82,7 @@ class Shapes:
         both = np.vstack([old, links, links[:, [1, 0, 2]]])
         first, neighbours, change = _compressed(both, self.n_lattice + len(every))
         return replace(
-            self,
-            first=first,
-            neighbours=neighbours,
-            change=change,
-            grown=every,
+            self, first=first, neighbours=neighbours, change=change, grown=every
         )
 
 

@@ -15,12 +15,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase
-from vdsm_pin.planner.fewest.elastic_band import (
-    pulled,
-    refined,
-    resampled,
-    shortened,
-)
+from vdsm_pin.planner.fewest.elastic_band import pulled, refined, resampled, shortened
 from vdsm_pin.planner.fewest.tip_cells import TipCells
 from vdsm_pin.planner.fewest.tip_room import TipRoom
 from vdsm_pin.problem.planning_problem import PlanningProblem

@@ -19,22 +19,12 @@ import numpy as np
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.paper.bend_kernels import (
-    Bends,
-    Passing,
-    clear_bends,
-    least_moves,
-)
+from vdsm_pin.planner.paper.bend_kernels import Bends, Passing, clear_bends, least_moves
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.lift import largest_angles
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
-from vdsm_pin.planner.paper.sections import (
-    VIEWS,
-    grown_by,
-    hull_corners,
-    planned_gap,
-)
+from vdsm_pin.planner.paper.sections import VIEWS, grown_by, hull_corners, planned_gap
 from vdsm_pin.planner.paper.tip_path import Route, drawn_rows, straight_route
 from vdsm_pin.problem.planning_problem import PlanningProblem
 

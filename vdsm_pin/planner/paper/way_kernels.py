@@ -9,12 +9,7 @@ import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.paper.region_kernels import (
-    Core,
-    point_to_core,
-    sides_of,
-    wrapped,
-)
+from vdsm_pin.planner.paper.region_kernels import Core, point_to_core, sides_of, wrapped
 
 
 @compiled
