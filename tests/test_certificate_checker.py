@@ -1,6 +1,7 @@
 """The checker accepts what is proved, over all shapes, and nothing that is not."""
 
 import copy
+import io
 import json
 import runpy
 import sys
@@ -551,6 +552,38 @@ def test_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main([*files[:2], str(tmp_path / "none.csv")]) == 2
     assert "none.csv" in capsys.readouterr().err
     assert main(files[:2]) == 2
+    assert main([*files[:2], str(tmp_path)]) == 2
+    assert f"{tmp_path}: is a folder, expected a file" in capsys.readouterr().err
+
+
+def test_a_trajectory_that_changes_while_it_is_checked_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is read by name more than once: what is judged is what the hash is of."""
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
+
+    def read(*given: Any) -> Any:
+        found = program_arm(*given)
+        case.trajectory.write_text(case.trajectory.read_text() + "\n")
+        return found
+
+    program_arm = program.Arm
+    monkeypatch.setattr(program, "Arm", read)
+    with pytest.raises(InvalidFile, match="changed while it was worked on"):
+        judge(case)
+
+
+def test_a_terminal_that_cannot_write_a_name_is_told_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
+    files = [str(x) for x in (case.certificate, case.problem, case.trajectory)]
+    streams = [io.TextIOWrapper(io.BytesIO(), encoding="ascii") for _ in "12"]
+    for name, stream in zip(("stdout", "stderr"), streams, strict=True):
+        monkeypatch.setattr(sys, name, stream)
+    assert main([*files[:2], str(tmp_path / "\xe5.csv")]) == 2
+    streams[1].seek(0)
+    assert "/\\xe5.csv: does not exist" in streams[1].read()
 
 
 @pytest.mark.parametrize(("more", "status"), [([], 0), (["one"], 2)])

@@ -227,6 +227,13 @@ def test_times_that_do_not_rise_are_refused(
     assert "times do not rise" in made.check(lines).reason
 
 
+def test_meshes_of_a_robot_are_there(tmp_path: Path) -> None:
+    made = Made(tmp_path)
+    (tmp_path / "tool.stl").unlink()
+    with pytest.raises(Rejected, match=r"mesh 'tool\.stl' is not found"):
+        Model(RobotFiles(made.folder / "all.urdf"), np.eye(4))
+
+
 def test_a_group_is_one_of_a_srdf(tmp_path: Path) -> None:
     made = Made(tmp_path)
     files = RobotFiles(made.folder / "all.urdf", group="arm")
