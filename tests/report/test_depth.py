@@ -84,3 +84,11 @@ def test_a_lower_bound_of_a_depth_is_no_depth_that_was_found() -> None:
     assert at_most(row.upper_m, row.deeper) == "−61.499 mm or deeper"
     both = row.model_copy(update={"lower_m": row.upper_m})
     assert kept_at_least(both).endswith(" mm or deeper")
+
+
+def test_a_refuted_clearance_is_told_as_what_two_points_prove() -> None:
+    """The motion may come nearer than the points that were found."""
+    found = beside_a_box(0.03)
+    row = next(one for one in found.checks if one.name == "clearance from obstacles")
+    told = reason(replace(found, checks=(row,)))
+    assert "clearance from obstacles is at most −31.499 mm against" in told

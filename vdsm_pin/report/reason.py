@@ -60,8 +60,7 @@ def reason(verification: Verification) -> str:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
     worst, asked = check_cells(first)
-    proved = first.name in (LINKS, OBSTACLES) and first.verdict is Verdict.UNDECIDED
-    found = f"{first.name} is {'proved to be at least ' * proved}{worst}"
+    found = f"{first.name} is {_bound(first)}{worst}"
     inside = first.name in (ARM_OUTSIDE, LINKS_OUTSIDE)
     if inside:
         found = first.where
@@ -79,6 +78,17 @@ def reason(verification: Verification) -> str:
         return f"The motion breaks {share}{first_of}{found}."
     undecided = f"The proof is not complete, {share} undecided{first_of}{found}."
     return f"{undecided} This counts as not passed."
+
+
+def _bound(check: Check) -> str:
+    """What the worst value of a check that did not pass is of the true one, in words.
+
+    A clearance that is refuted is as small as two points are apart, perhaps smaller.
+    """
+    if check.name not in (LINKS, OBSTACLES) or check.deeper:
+        return ""
+    refuted = check.verdict is Verdict.REFUTED
+    return "at most " if refuted else "proved to be at least "
 
 
 def plan_reason(plan: Plan, verification: ArmVerification) -> str:
