@@ -5,7 +5,7 @@ calls.
 """
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import FrameType
 
@@ -24,6 +24,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification import coal_check
 from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.coal_bodies import Call
 from vdsm_pin.verification.link_clearance import link_clearance
 
 
@@ -102,14 +103,15 @@ def test_coal_is_asked_where_it_adds_evidence(
     planned: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem, asked = near(), 0
-    measure = measuring.measure
+    measure = measuring.measure_each
 
-    def counting(*arguments: object) -> object:
+    def counting(calls: Iterable[Call], count: int) -> object:
         nonlocal asked
-        asked += 1
-        return measure(*arguments)  # type: ignore[arg-type]
+        every = list(calls)
+        asked += len(every)
+        return measure(every, count)
 
-    monkeypatch.setattr(measuring, "measure", counting)
+    monkeypatch.setattr(measuring, "measure_each", counting)
     coal_check.check_coal(problem, planned)
     pairs = planned.n_samples * problem.manipulator.n_links
     assert 8 + 21 <= asked <= 21 + 0.4 * pairs

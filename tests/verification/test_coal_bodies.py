@@ -3,6 +3,8 @@
 The oracles are closed forms and the proved brackets, never Coal itself.
 """
 
+import math
+
 import coal
 import numpy as np
 import pytest
@@ -28,6 +30,7 @@ from vdsm_pin.verification.coal_bodies import (
     coal_bodies,
     distance_request,
     measure,
+    measure_each,
 )
 from vdsm_pin.verification.coal_check import check_coal
 from vdsm_pin.verification.coal_hulls import (
@@ -300,8 +303,8 @@ NEAR = np.array([1.0, 2.0, 3.0])
 def test_an_answer_of_coal_is_used_where_all_it_says_agrees(
     distance: float, stored: float, away: float, usable: bool
 ) -> None:
-    far = NEAR + np.array([0.0, away, 0.0])
-    assert coal_side._usable(distance, stored, NEAR, far) is usable
+    gap = math.dist(NEAR, NEAR + np.array([0.0, away, 0.0]))
+    assert bool(coal_side._usable(distance, stored, gap)) is usable
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 12, 40])
@@ -432,3 +435,50 @@ def test_a_disagreement_is_what_lies_outside_the_bracket() -> None:
     )
     distance, lower, upper, expected = np.array(cases).T
     np.testing.assert_allclose(disagreement(distance, lower, upper), expected)
+
+
+def test_many_pairs_are_measured_as_each_by_itself() -> None:
+    """Obstacles of one part and of several, a cloud, what Coal cannot take, no call."""
+    rng, request = np.random.default_rng(7), distance_request()
+    cloud = coal_bodies(PointCloud("scan", rng.normal(size=(300, 3)), 0.01))
+    balls = [Hull(2.0 * rng.normal(size=(1, 3)), 0.1) for _ in range(4)]
+    obstacles = [coal_parts(balls[:1]), coal_parts(balls), cloud, None]
+    calls, pairs = [], 100
+    for k in range(pairs - 1):  # two bodies in a pair, or one
+        for _ in range(1 + k % 2):
+            size, shift = rng.uniform(0.1, 1.0, 2), rng.normal(size=3)
+            capsule, turn = coal.Capsule(*size), rotation_from_rpy(rng.normal(size=3))
+            calls.append((k, capsule, turn, shift, obstacles[k % 4]))
+    found = measure_each(calls, pairs)
+    for k in range(pairs):
+        answers = [
+            measure(request, shape, coal.Transform3s(turn, shift), bodies)
+            for number, shape, turn, shift, bodies in calls
+            if number == k and bodies is not None
+        ]
+        if not answers:
+            assert np.isnan([found.distance[k], *found.near[k], *found.far[k]]).all()
+            continue
+        best = min(answers, key=lambda one: one.distance)
+        assert found.distance[k] == best.distance
+        np.testing.assert_array_equal(found.near[k], best.near)
+        np.testing.assert_array_equal(found.far[k], best.far)
+
+
+def test_one_unusable_answer_of_many_spoils_its_pair_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    usual, ball, turn = coal.distance, coal.Sphere(0.1), np.eye(3)
+    parts = coal_parts([Hull(np.array([[x, 0.0, 0.0]]), 0.1) for x in (1.0, 2.0)])
+    calls = [(k, ball, turn, np.array([0.0, k, 0.0]), parts) for k in range(3)]
+    answered = 0
+
+    def failing(*arguments: object) -> float:
+        nonlocal answered
+        answered += 1
+        return -LARGEST if answered == 4 else usual(*arguments)
+
+    honest = measure_each(calls, 3).distance
+    monkeypatch.setattr(coal, "distance", failing)
+    found = measure_each(calls, 3).distance
+    assert found.tolist() == [honest[0], -np.inf, honest[2]]

@@ -208,14 +208,14 @@ STRAIGHT = Trajectory(
 def test_a_wrong_distance_is_noticed_on_both_sides(
     excess: float, sign: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    honest = measuring.measure
+    honest = measuring.measure_each
 
     def lying(*arguments: object) -> Measured:
         found = honest(*arguments)
         error = sign * excess * TOLERANCES.coal_agreement
         return Measured(found.distance + error, found.near, found.far)
 
-    monkeypatch.setattr(measuring, "measure", lying)
+    monkeypatch.setattr(measuring, "measure_each", lying)
     (check,) = check_coal(ball_near_link_4(0.01), STRAIGHT)
     expected = Verdict.CERTIFIED if excess < 1.0 else Verdict.UNDECIDED
     assert check.verdict is expected
@@ -224,15 +224,15 @@ def test_a_wrong_distance_is_noticed_on_both_sides(
 def test_a_lie_leaves_the_whole_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     """One of Coal's distances 0.1 mm off: the row says which, nothing is certified."""
     problem, drawn = ball_near_link_4(0.01), replace(STRAIGHT, on_path=np.ones(2))
-    honest = measuring.measure
+    honest = measuring.measure_each
 
     def lying(*arguments: object) -> Measured:
         found = honest(*arguments)
-        off = 1e-4 if 0.0 < found.distance < 0.011 else 0.0
-        return Measured(found.distance + off, found.near, found.far)
+        near = (found.distance > 0.0) & (found.distance < 0.011)
+        return Measured(found.distance + 1e-4 * near, found.near, found.far)
 
     for tell, verdict in ((honest, Verdict.CERTIFIED), (lying, Verdict.UNDECIDED)):
-        monkeypatch.setattr(measuring, "measure", tell)
+        monkeypatch.setattr(measuring, "measure_each", tell)
         found = verify(problem, drawn)
         row = next(c for c in found.checks if c.name == coal_check.COAL)
         assert row.verdict is verdict
@@ -256,13 +256,13 @@ def test_no_answer_is_no_agreement(
 
 
 def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = measuring.measure
+    honest = measuring.measure_each
 
     def flipped(*arguments: object) -> Measured:
         found = honest(*arguments)
         return Measured(-found.distance, found.near, found.far)
 
-    monkeypatch.setattr(measuring, "measure", flipped)
+    monkeypatch.setattr(measuring, "measure_each", flipped)
     for gap in (0.01, -0.01):
         (check,) = check_coal(ball_near_link_4(gap), STRAIGHT)
         assert check.verdict is Verdict.UNDECIDED

@@ -96,14 +96,14 @@ def test_two_links_have_no_pair() -> None:
 def test_a_wrong_distance_is_noticed(
     excess: float, sign: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    honest = measuring.measure
+    honest = measuring.measure_each
 
     def lying(*arguments: object) -> Measured:
         found = honest(*arguments)
         error = sign * excess * TOLERANCES.coal_agreement
         return Measured(found.distance + error, found.near, found.far)
 
-    monkeypatch.setattr(measuring, "measure", lying)
+    monkeypatch.setattr(measuring, "measure_each", lying)
     arm = built_in("hrm8")
     motion = trajectory_of(arm, 5, 0.3)
     (check,) = check_coal(problem_for(arm), motion)

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.solids import (
@@ -48,7 +48,7 @@ class Measured(NamedTuple):
         far: Witness on the second, base frame, shape (3,); [m].
     """
 
-    distance: float
+    distance: Any
     near: FloatArray
     far: FloatArray
 
@@ -87,7 +87,7 @@ class CoalCloud:
     def measured(self, request: Any, geometry: Any, pose: Any) -> Measured:
         """What Coal says of the nearest body; arguments are those of `measure`."""
         geometry.computeLocalAABB()
-        box, best, result = geometry.aabb_local, NOTHING, new_result()
+        box, best = geometry.aabb_local, NOTHING
         bounds = _gaps(box, pose, self._middle) - self._reach
         for k in np.argsort(bounds):
             if bounds[k] > max(best.distance, 0.0):
@@ -98,7 +98,7 @@ class CoalCloud:
                 if each[i] > max(best.distance, 0.0):
                     break
                 body = placed(self._shape, group[i], self._rotation)
-                found = _nearest(request, geometry, pose, (body,), result)
+                found = _nearest(request, geometry, pose, (body,))
                 best = min(best, found, key=lambda one: one.distance)
         return best
 
@@ -202,16 +202,7 @@ def distance_request() -> Any:
     return request
 
 
-def new_result() -> Any:
-    """Room for one answer of Coal after the other."""
-    import coal
-
-    return coal.DistanceResult()
-
-
-def measure(
-    request: Any, geometry: Any, pose: Any, bodies: CoalObstacle, result: Any = None
-) -> Measured:
+def measure(request: Any, geometry: Any, pose: Any, bodies: CoalObstacle) -> Measured:
     """Distance between one body and the nearest part of an obstacle.
 
     Args:
@@ -219,40 +210,125 @@ def measure(
         geometry: A coal.CollisionGeometry.
         pose: Its coal.Transform3s.
         bodies: The obstacle.
-        result: From `new_result`, for those who measure much; None for a new one.
 
     Returns:
         The nearest part's answer; one unusable answer makes the whole unusable.
     """
     if isinstance(bodies, CoalCloud):
         return bodies.measured(request, geometry, pose)
-    return _nearest(request, geometry, pose, bodies, result or new_result())
+    return _nearest(request, geometry, pose, bodies)
 
 
 def _nearest(
-    request: Any, geometry: Any, pose: Any, bodies: Iterable[CoalBody], result: Any
+    request: Any, geometry: Any, pose: Any, bodies: Iterable[CoalBody]
 ) -> Measured:
     import coal
 
-    best = NOTHING
+    best, result = NOTHING, coal.DistanceResult()
     for body in bodies:
         result.clear()
         distance = coal.distance(
             geometry, pose, body.geometry, body.pose, request, result
         )
         near, far = result.getNearestPoint1(), result.getNearestPoint2()
-        if not _usable(distance, result.min_distance, near, far):
+        gap = math.dist(near.tolist(), far.tolist())
+        if not _usable(distance, result.min_distance, gap):
             return Measured(float("-inf"), near, far)
         if distance < best.distance:
             best = Measured(float(distance), near, far)
     return best
 
 
-def _usable(distance: float, stored: float, near: FloatArray, far: FloatArray) -> bool:
-    """Whether an answer is one: a number, no sentinel, and borne out by its witness."""
-    if distance != stored or not abs(distance) < LARGEST:
-        return False
-    if distance <= 0.0:
-        return True
-    excess = abs(math.dist(near.tolist(), far.tolist()) - distance)
-    return excess <= TOLERANCES.coal_agreement
+def _usable(distance: Any, stored: Any, gap: Any) -> Any:
+    """Whether an answer is one: a number, no sentinel, and borne out by its witness.
+
+    Of numbers or arrays of them.
+
+    Args:
+        distance: As Coal returns it; [m].
+        stored: The same as Coal keeps it; [m].
+        gap: Between its witnesses; [m].
+    """
+    borne_out = abs(gap - distance) <= TOLERANCES.coal_agreement
+    number = (distance == stored) & (abs(distance) < LARGEST)
+    return number & (borne_out | (distance <= 0.0))
+
+
+Call: TypeAlias = tuple[int, Any, FloatArray, FloatArray, CoalObstacle | None]
+"""Number of a pair, a coal.CollisionGeometry and its R and p, and the obstacle that it
+is measured from; None for one that Coal cannot take."""
+
+
+def measure_each(calls: Iterable[Call], count: int) -> Measured:
+    """`measure` of many pairs, each the nearest of its calls; NaN for one without any.
+
+    Args:
+        calls: In the order of their pairs.
+        count: Number of pairs.
+
+    Returns:
+        Arrays of what it has of one pair.
+    """
+    import coal
+
+    request, result, pose = (
+        distance_request(),
+        coal.DistanceResult(),
+        coal.Transform3s(),
+    )
+    pairs, told, stored = list[int](), list[float](), list[float]()
+    near, far = list[FloatArray](), list[FloatArray]()
+    for pair, shape, turn, shift, bodies in calls:
+        pose.setTransform(turn, shift)
+        if isinstance(bodies, CoalCloud):
+            found = measure(request, shape, pose, bodies)
+            pairs.append(pair)
+            told.append(found.distance)
+            stored.append(found.distance)
+            near.append(found.near)
+            far.append(found.far)
+            continue
+        for body in bodies or ():
+            result.clear()  # a new one costs as much as a distance
+            asked = shape, pose, body.geometry, body.pose, request, result
+            pairs.append(pair)
+            told.append(coal.distance(*asked))
+            stored.append(result.min_distance)
+            near.append(result.getNearestPoint1())
+            far.append(result.getNearestPoint2())
+    columns = np.array(told), np.array(stored)
+    return _nearest_of_each(np.array(pairs, np.int64), columns, (near, far), count)
+
+
+def _nearest_of_each(
+    pair: IntArray,
+    distances: tuple[FloatArray, FloatArray],
+    points: tuple[list[FloatArray], list[FloatArray]],
+    count: int,
+) -> Measured:
+    """The nearest answer of each pair; one unusable one makes a pair's unusable.
+
+    Args:
+        pair: Of each answer, rising, shape (m,).
+        distances: As Coal returned and kept them, shape (m,); [m].
+        points: Witnesses.
+        count: Number of pairs.
+    """
+    found = Measured(np.full(count, np.nan), *np.full((2, count, 3), np.nan))
+    if not pair.size:
+        return found
+    near, far = (np.concatenate(side).reshape(-1, 3) for side in points)
+    gap = np.linalg.norm(near - far, axis=1)
+    distance = np.where(_usable(*distances, gap), distances[0], -np.inf)
+    if pair.size > count or not (np.diff(pair) > 0).all():
+        order = np.lexsort((distance, pair))
+        first = order[np.append(True, np.diff(pair[order]) > 0)]
+        pair, distance, near, far = (
+            pair[first],
+            distance[first],
+            near[first],
+            far[first],
+        )
+    for column, values in zip(found, (distance, near, far), strict=True):
+        column[pair] = values
+    return found

@@ -4,7 +4,6 @@ Whoever asks has the frames' poses, from Pinocchio where it can.
 """
 
 from collections.abc import Sequence
-from math import nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +12,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.verification.coal_bodies import (
     CoalCloud,
     CoalObstacle,
-    Measured,
-    distance_request,
-    measure,
-    new_result,
+    measure_each,
 )
 
 
@@ -116,31 +112,17 @@ class CoalShapes:
             poses: T_base_frame at some rows, shape (n_rows, n_frames, 3, 4); [m].
             sides: The pairs.
         """
-        import coal
-
-        first, nothing = self._parts.first, Measured(nan, *np.full((2, 3), nan))
-        least = [nothing] * len(sides.row)
+        first = self._parts.first
         # Every part of every first body, pair by pair.
         n_parts = first[sides.one + 1] - first[sides.one]
-        pair = np.repeat(np.arange(len(least)), n_parts)
+        pair = np.repeat(np.arange(len(sides.row)), n_parts)
         within = np.arange(pair.size) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
         part = first[sides.one][pair] + within
         places = self._places(poses, Sides(*(side[pair] for side in sides)), part)
-        request, pose, result = distance_request(), coal.Transform3s(), new_result()
         shapes = [self._parts.shapes[k] for k in part.tolist()]
         partners = [self._bodies[k] for k in sides.other[pair].tolist()]
-        calls = zip(pair.tolist(), shapes, partners, *places, strict=True)
-        for k, shape, partner, turn, shift in calls:
-            if partner is not None:
-                pose.setTransform(turn, shift)
-                answer = measure(request, shape, pose, partner, result)
-                if not answer.distance >= least[k].distance:
-                    least[k] = answer
-        points = np.zeros((2, len(least), 3))
-        if least:
-            points[0] = np.concatenate([one.near for one in least]).reshape(-1, 3)
-            points[1] = np.concatenate([one.far for one in least]).reshape(-1, 3)
-        return Distances(np.array([one.distance for one in least]), *points)
+        calls = zip(pair.tolist(), shapes, *places, partners, strict=True)
+        return Distances(*measure_each(calls, len(sides.row)))
 
     def _places(
         self, poses: FloatArray, sides: Sides, part: IntArray
