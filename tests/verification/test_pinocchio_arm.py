@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
 
@@ -191,3 +192,16 @@ def test_an_arm_loaded_again_is_the_same_and_another_one_is_not_taken_for_it() -
         assert reach == pytest.approx(arm.total_length)
         text = urdf_text(arm)
         assert robot.urdf_sha256 == hashlib.sha256(text.encode()).hexdigest()
+
+
+def test_frames_are_read_by_turns_and_by_threads_at_once() -> None:
+    model, rng = load_arm(HRM8).model, np.random.default_rng(12)
+    frames = PinocchioFrames.of(model, ["link2", "link7", "tip"])
+    q = 0.3 * rng.normal(size=(8, 40, model.nq))
+    usual = [PinocchioFrames.of(model, ["link2", "link7", "tip"]).poses(x) for x in q]
+    for x, poses in zip(q, usual, strict=True):
+        np.testing.assert_array_equal(frames.origins(x), poses[..., 3])
+        np.testing.assert_array_equal(frames.poses(x), poses)
+    with ThreadPoolExecutor(4) as pool:
+        for poses, found in zip(usual, pool.map(frames.poses, q), strict=True):
+            np.testing.assert_array_equal(found, poses)

@@ -15,7 +15,7 @@ from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.packed_tree import PRISMATIC, PackedTree, pack_tree
 from vdsm_pin.proof.terms import WORLD, Bodies, Places
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.proof.ways import Ways, WayTable
+from vdsm_pin.proof.ways import WayErrors, Ways, WayTable, way_errors
 
 KEPT: Final = 2
 """Robots of which they are kept: those of a humanoid's hulls take 0.1 GB."""
@@ -31,6 +31,7 @@ class MovingSides(NamedTuple):
         bodies: The bodies; their numbers and columns are not theirs yet.
         ways: What lies between the frames.
         places: Where corners are seen.
+        exact: What comes of no errors at all.
         way: Of each side that is asked for, shape (n_sides,).
         slot: Where the numbers of its corners' places start, shape (n_sides,).
         slots: Numbers of places.
@@ -39,6 +40,7 @@ class MovingSides(NamedTuple):
     bodies: Bodies
     ways: Ways
     places: Places
+    exact: WayErrors
     way: IntArray
     slot: IntArray
     slots: IntArray
@@ -58,8 +60,8 @@ def moving_sides(
     Raises:
         ValueError: If a body is of another kind.
     """
-    packed = _pack_bodies(bodies)
-    table = _PlaceTable(pack_tree(tree))
+    packed, joints = _pack_bodies(bodies), pack_tree(tree)
+    table = _PlaceTable(joints)
     way, slot = np.zeros((2, len(asked)), np.int64)
     found, count = [np.zeros(0, np.int64)], 0
     for k, (rest, body) in enumerate(asked):
@@ -68,7 +70,9 @@ def moving_sides(
         count += len(found[-1])
     places, slots = table.packed(), np.concatenate(found)
     slots = np.where(slots < 0, places.n_points - 1 - slots, slots)
-    return MovingSides(packed, table.ways.packed(), places, way, slot, slots)
+    ways, none = table.ways.packed(), np.zeros(joints.parent.size)
+    exact = way_errors(joints, ways, none, none, none)
+    return MovingSides(packed, ways, places, exact, way, slot, slots)
 
 
 def _only_piece(body: Body) -> Hull | FlatCylinder:

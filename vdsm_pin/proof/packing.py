@@ -79,8 +79,7 @@ def pack_task(
     )
     if pieces is None:
         pieces = pack_pieces([body.pieces for body in bodies])
-    blank = np.zeros(joints.parent.size)
-    exact = way_errors(joints, moving.ways, blank, blank, blank)
+    exact = moving.exact
     between = moving.ways, exact, moving.places
     task = Task(pieces, joints, *between, movers, packed, rules)
     return _erring(task, exact, np.zeros(n))

@@ -129,9 +129,12 @@ def verdicts_of(counts: IntArray) -> IntArray:
 def summed(results: Results, plan: PartPlan, n: int, in_time: bool) -> Proof:
     """What was proved of the parts of n pairs, summed up by pair."""
     best, owner = results.best, plan.owner
-    first = np.searchsorted(owner, np.arange(n))
-    judged = np.add.reduceat(results.counts, first) if n else results.counts
-    least, met = (np.lexsort((best[:, side], owner))[first] for side in (LOW, UP))
+    judged, least = results.counts, np.arange(n)
+    met = least
+    if len(owner) > n:  # pairs of several parts
+        first = np.searchsorted(owner, least)
+        judged = np.add.reduceat(judged, first)
+        least, met = (np.lexsort((best[:, side], owner))[first] for side in (LOW, UP))
     points = best[met, OWN:].reshape(-1, 2, 3)
     turned = plan.swapped[met]
     points[turned] = points[turned, ::-1]

@@ -123,12 +123,18 @@ def _moving_pieces(bodies: tuple[Body, ...]) -> PackedPieces:
 
 def _extent(tree: Tree, pieces: PackedPieces) -> float:
     """Bound of all lengths and coordinates where q is 0; [m]."""
+    values = (pieces.points, pieces.centre, pieces.extent, pieces.radius)
+    return _stretched(tree) + max(float(np.abs(x).max(initial=0.0)) for x in values)
+
+
+@lru_cache(maxsize=KEPT)
+def _stretched(tree: Tree) -> float:
+    """The way along all joints where q is 0; [m]."""
     far = 0.0
     for joint in tree.joints:
         far += float(np.linalg.norm(np.asarray(joint.placement)[:3, 3]))
         far += abs(joint.offset)
-    values = (pieces.points, pieces.centre, pieces.extent, pieces.radius)
-    return far + max(float(np.abs(x).max(initial=0.0)) for x in values)
+    return far
 
 
 def _check(tree: Tree, bodies: Sequence[Body]) -> None:

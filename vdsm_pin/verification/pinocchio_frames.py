@@ -4,14 +4,26 @@ Pinocchio is imported inside the functions, so that commands that do not verify 
 without it, and its failures are translated here.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray
+
+Parts: TypeAlias = Callable[[Any], list[FloatArray]]
+"""Views of a pinocchio.SE3."""
+
+
+class _Seen(threading.local):
+    """What a thread reads poses from: views of what is overwritten row by row."""
+
+    data: Any = None
+    live: Sequence[FloatArray] = ()
+    parts: "Parts | None" = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +37,7 @@ class PinocchioFrames:
 
     model: Any
     numbers: tuple[int, ...]
+    _seen: "_Seen" = field(default_factory=_Seen, init=False, repr=False)
 
     @classmethod
     def of(cls, model: Any, links: Iterable[str]) -> "PinocchioFrames":
@@ -48,27 +61,36 @@ class PinocchioFrames:
         Args:
             q: As Pinocchio has it, shape (n_rows, model.nq); [rad], [m].
         """
-        found = self._read(q, lambda one: [one.rotation.T.reshape(-1), one.translation])
-        return found.reshape(len(q), -1, 4, 3).swapaxes(2, 3)
+        return self._read(q, _pose).reshape(len(q), -1, 4, 3).swapaxes(2, 3)
 
     def origins(self, q: FloatArray) -> FloatArray:
         """The origins of the links alone, sooner, shape (n_rows, n_links, 3); [m]."""
-        return self._read(q, lambda one: [one.translation]).reshape(len(q), -1, 3)
+        return self._read(q, _origin).reshape(len(q), -1, 3)
 
-    def _read(
-        self, q: FloatArray, parts: Callable[[Any], list[FloatArray]]
-    ) -> FloatArray:
+    def _read(self, q: FloatArray, parts: Parts) -> FloatArray:
         """Some parts of each pose, one after the other, (n_rows, size of all)."""
         import pinocchio as pin
 
-        data = self.model.createData()
-        # Views of what is overwritten row by row.
-        live = [part for number in self.numbers for part in parts(data.oMf[number])]
+        if self._seen.parts is not parts:
+            data = self._seen.data = self.model.createData()
+            frames = (data.oMf[number] for number in self.numbers)
+            self._seen.live = [part for frame in frames for part in parts(frame)]
+            self._seen.parts = parts
+        data, live = self._seen.data, self._seen.live
         found = np.zeros((len(q), sum(part.size for part in live)))
         for row, values in zip(found, q, strict=True):
             pin.framesForwardKinematics(self.model, data, values)
             np.concatenate(live, out=row)
         return found
+
+
+def _pose(frame: Any) -> list[FloatArray]:
+    """Rotation, column by column, and origin of a pinocchio.SE3."""
+    return [frame.rotation.T.reshape(-1), frame.translation]
+
+
+def _origin(frame: Any) -> list[FloatArray]:
+    return [frame.translation]
 
 
 def read_model(text: str, *root: Any) -> Any:
