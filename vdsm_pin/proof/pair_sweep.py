@@ -51,7 +51,7 @@ from vdsm_pin.proof.terms import CERTIFIED, Mover, Task, finer, mover_of
 from vdsm_pin.proof.witnesses import witness_at
 from vdsm_pin.proof.workspace import Workspace, load_rows, take_frame
 
-FIRST_TRIED: Final = 8
+FIRST_TRIED: Final = 4
 """Intervals that a new plane is tried on at first; doubled as long as it serves."""
 
 ROUGH: Final = 0.1

@@ -15,7 +15,7 @@ from vdsm_pin.proof.layouts import OWN_POINT, POINT, SUPPORT
 from vdsm_pin.proof.rows import BLOCK, Rows, Tracks, carry, to_frame, turn_axis
 from vdsm_pin.proof.terms import Mover
 
-MANY_ROWS: Final = 8
+MANY_ROWS: Final = 16
 """From so many rows on loops over rows are quicker than over corners."""
 
 
