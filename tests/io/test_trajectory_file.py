@@ -229,6 +229,17 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
     assert refused(tmp_path, csv()[0] + "\n" + "\n" * 20_000) == "has no row"
 
 
+def test_what_a_row_has_too_many_is_not_taken_for_the_next_one(tmp_path: Path) -> None:
+    """A line end between two other values leaves as many values in all."""
+    lines = csv()
+    first, last = lines[2].rsplit(",", 1)
+    longer, shorter = f"{lines[1]},{first}", last
+    moved = [lines[0], f"{lines[1]},0", first, *lines[3:], ""]
+    assert refused(tmp_path, "\n".join(moved)).startswith("line 2: has 9 values")
+    moved = [lines[0], longer, shorter, *lines[3:], ""]
+    assert refused(tmp_path, "\n".join(moved)).startswith("line 2: has 15 values")
+
+
 def test_more_rows_than_any_trajectory_has_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -126,10 +126,8 @@ def read_yaml(text: str, *, file: object) -> YamlDocument:
 
 def _stand_ins(text: str) -> dict[int, str]:
     """Codes that the text does not use for the signs that the parser mistakes."""
-    signs = [sign for sign in _NO_ENDS if sign in text]
-    if not signs:
-        return {}
     used = set(text)
+    signs = [sign for sign in _NO_ENDS if sign in used]
     free = (code for code in _PRIVATE if chr(code) not in used)
     return dict(zip(free, signs, strict=False))
 
