@@ -1,10 +1,14 @@
 """Crossings of rays and triangles; oracle: the linear system of ray and corners."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from oracles.closed_solids import solid
 
 from vdsm_pin.geometry import winding
+from vdsm_pin.geometry.winding import Side
 
 
 def test_crossings_in_doubt_are_those_of_the_linear_system() -> None:
@@ -91,3 +95,24 @@ def test_rays_are_spread_over_all_directions() -> None:
     any_way = np.random.default_rng(6).normal(size=(2000, 3))
     any_way /= np.linalg.norm(any_way, axis=1)[:, None]
     assert np.arccos((any_way @ rays.T).max(axis=1)).max() < 0.55
+
+
+@pytest.mark.parametrize(
+    ("seen", "turned", "signed", "side", "why"),
+    [
+        (set(), False, True, Side.UNKNOWN, "lies on its surface"),
+        ({1}, True, True, Side.UNKNOWN, "faces that are given in both senses"),
+        ({1}, False, False, Side.UNKNOWN, "faces are turned opposite ways"),
+        ({1, -1}, False, True, Side.UNKNOWN, "fronts of its faces as well as backs"),
+        ({1}, False, True, Side.OUTSIDE, ""),
+        ({-1}, False, True, Side.OUTSIDE, ""),
+    ],
+)
+def test_what_keeps_the_inside_from_being_told(
+    seen: set[int], turned: bool, signed: bool, side: Side, why: str
+) -> None:
+    mesh: Any = SimpleNamespace(turned=turned, signed=np.array([signed, False]))
+    found = winding._enclosed(mesh, seen)
+    assert found.side is side
+    assert why in found.reason
+    assert bool(found.reason) is (side is Side.UNKNOWN)

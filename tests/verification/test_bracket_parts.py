@@ -34,6 +34,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import (
     clearance,
     coal_missing,
+    counterexample,
     proved_lowers,
 )
 from vdsm_pin.verification.approaches import nearest_pairs
@@ -67,7 +68,13 @@ from vdsm_pin.verification.enclosed import (
     pairs_inside,
 )
 from vdsm_pin.verification.first_contact import FirstContact
-from vdsm_pin.verification.moving import MOST_PARTS, PART, Knots, in_short_parts
+from vdsm_pin.verification.moving import (
+    MOST_PARTS,
+    PART,
+    Knots,
+    in_short_parts,
+    whole_rows,
+)
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.records import Check, Counterexample, Pair, Verdict
 from vdsm_pin.verification.task import arm_assembly
@@ -718,3 +725,46 @@ def test_what_begins_inside_is_refuted_from_the_beginning() -> None:
         assert refuted.moment == refuted.first_moment == 0.0
         assert np.isnan(refuted.last_moment) and refuted.deeper is True
         assert refuted.too_close_intervals == refuted.too_close_stretches == 0
+
+
+def test_without_obstacles_nothing_is_missing() -> None:
+    problem = PlanningProblem("p", ARM, Scene(), None, 0.1, np.eye(4))
+    still, rows = np.zeros(2), np.zeros((2, ARM.n_links))
+    motion = Trajectory(still > 0, still, still, rows, rows)
+    assert coal_missing.coal_missing(problem, motion) == ()
+
+
+def test_counterexamples_are_told_in_rows_of_the_trajectory() -> None:
+    """Rows 0, 1 and 2 with knots between, where something else has some."""
+    path = Path(np.zeros((3, 1)), times=np.array([5.0, 6.0, 8.0]))
+    shown, share = SimpleNamespace(x=7), 0.3
+    found: Any = tuple(
+        Counterexample(k, share, *[shown] * 4, 0.0, *[shown] * 3)  # type: ignore[arg-type]
+        for k in range(4)
+    )
+    times = np.array([5.0, 5.5, 6.0, 7.0, 8.0])
+    told = counterexample.in_rows(found, Knots.of(path, times))
+    assert [one.interval for one in told] == [0, 0, 1, 1]
+    expected = [0.15, 0.65, 0.15, 0.65]
+    assert [one.share for one in told] == pytest.approx(expected)
+    assert all(one.joints is shown for one in told)
+    assert counterexample.in_rows((), Knots.of(path, times)) == ()
+    assert counterexample.in_rows(found[:2], Knots.of(path, None)) == found[:2]
+
+
+def test_rows_of_what_moves_stand_behind_those_of_the_arm() -> None:
+    still, rows = np.zeros(3), np.zeros((3, ARM.n_links))
+    place = np.array([0.0, 1.0, 2.0])
+    alone = Trajectory(still > 0, still, place, rows, rows)
+    moments = np.array([0.5, 1.25])
+    problem: Any = SimpleNamespace(scene=SimpleNamespace(carriers=()))
+    found = whole_rows(problem, alone, moments)
+    assert found.shape == (2, 1 + 2 * ARM.n_links)
+    assert found[:, 0].tolist() == [0.5, 1.25]
+    timed = replace(alone, times=np.array([3.0, 4.0, 6.0]))
+    carrier = Path(np.array([[10.0], [16.0]]), times=np.array([3.0, 6.0]))
+    problem.scene.carriers = (SimpleNamespace(path=carrier),)
+    found = whole_rows(problem, timed, moments)
+    assert found[:, 0].tolist() == [0.5, 1.25]
+    assert found[:, -1] == pytest.approx([11.0, 13.0])  # at 3.5 and 4.5 s
+    assert np.array_equal(whole_rows(problem, alone, moments), found[:, :-1])

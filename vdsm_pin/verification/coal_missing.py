@@ -57,8 +57,6 @@ def coal_missing(
     Raises:
         OutOfTime: If the time is over.
     """
-    if not problem.scene.obstacles:
-        return ()
     worst: dict[tuple[int, int], Missing] = {}
     arm = CoalArm(problem, deadline, links=False)
     room = NEAR * problem.manipulator.most_radius
