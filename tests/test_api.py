@@ -172,6 +172,29 @@ def test_arguments_of_another_kind_are_refused_in_a_sentence() -> None:
             call()
 
 
+def test_values_made_twice_are_equal_and_found_in_lists() -> None:
+    """Arrays are compared by their values, never as a truth of many."""
+    for name in ("paper/obs1", "paper/obs2"):
+        one, other = vp.read_problem(name), vp.read_problem(name)
+        assert one == other
+        assert hash(one) == hash(other)
+        assert one.scene.obstacles[0] in list(other.scene.obstacles)
+        assert len({one.manipulator, other.manipulator}) == 1
+    assert vp.read_problem("paper/obs1") != vp.read_problem("paper/obs3")
+    motion = vp.Trajectory([0], [0], [0.1], [[0.2] * 3], [[0.3] * 3])
+    same = vp.Trajectory([0], [0], [0.1], [[0.2] * 3], [[0.3] * 3])
+    assert motion == same
+    assert motion != replace(same, x0=np.array([0.1 + 1e-16]) * 1.1)
+    assert motion != replace(same, times=np.array([0.0]))
+    assert motion not in (None, 3, motion.x0.tolist())
+    row = vp.JointTrajectory(("a",), [[1.0]])
+    assert (
+        row == vp.JointTrajectory(("a",), [[1.0]]) != vp.JointTrajectory(("b",), [[1]])
+    )
+    mesh = vp.Mesh("m", np.eye(3), [[0, 1, 2]])
+    assert mesh == vp.Mesh("m", np.eye(3), [[0, 1, 2]]) != vp.Sphere("m", [0, 0, 0], 1)
+
+
 def test_errors_are_equal_in_whatever_units_they_were_stated() -> None:
     stated = vp.ErrorBox(
         joint_deg=[0.5, 0.1, 0.2], base_mm=2.0, obstacles_mm={"ball": 1.0}

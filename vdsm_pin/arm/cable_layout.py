@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze
+from vdsm_pin.geometry.arrays import ByValue, FloatArray, check_numbers, freeze
 
 
-@dataclass(frozen=True)
-class CableLayout:
+@dataclass(frozen=True, eq=False)
+class CableLayout(ByValue):
     """Where the three driving cables of each link run (paper, section 5.2).
 
     Args:

@@ -11,7 +11,7 @@ import numpy as np
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.mounted import MAX_LENGTH, BodySolid, Feed, LinkBody, Tool
 from vdsm_pin.errors import InvalidInput, UnknownName
-from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, frozen
+from vdsm_pin.geometry.arrays import ByValue, FloatArray, check_numbers, freeze, frozen
 from vdsm_pin.geometry.solids import Capsule
 from vdsm_pin.units import MM_PER_M
 
@@ -32,8 +32,8 @@ PART: Final = " part "
 """Between the name of a body and the number of its convex part."""
 
 
-@dataclass(frozen=True)
-class Manipulator:
+@dataclass(frozen=True, eq=False)
+class Manipulator(ByValue):
     """Lengths, bodies and limits of one arm. A link is a capsule about its axis.
 
     Args:

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from math import prod
 from mmap import MAP_ANONYMOUS, MAP_PRIVATE, mmap
 from typing import Any, Final, TypeAlias
@@ -167,6 +168,36 @@ def check_numbers(record: Any, *names: str) -> None:
         if type(value) is not float:
             with called(f"{type(record).__name__}: {name}"):
                 object.__setattr__(record, name, number(value))
+
+
+class ByValue:
+    """Dataclasses that are equal where all their fields are, arrays by their values.
+
+    Their decorator says `eq=False`: what it makes itself cannot compare arrays.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are of one class and have the same values."""
+        return type(other) is type(self) and all(
+            _same(getattr(self, name), getattr(other, name)) for name in _fields(self)
+        )
+
+    def __hash__(self) -> int:
+        """Of the fields that are one plain value."""
+        values = (getattr(self, name) for name in _fields(self))
+        plain = tuple(one for one in values if isinstance(one, str | int | float))
+        return hash((type(self).__name__, *plain))
+
+
+def _fields(record: Any) -> list[str]:
+    return [one.name for one in fields(record) if one.compare]
+
+
+def _same(one: Any, other: Any) -> bool:
+    arrays = isinstance(one, np.ndarray), isinstance(other, np.ndarray)
+    if one is other or not any(arrays):
+        return one is other or bool(one == other)
+    return all(arrays) and np.array_equal(one, other)
 
 
 def same_arrays(one: object, other: object, names: Sequence[str]) -> bool:

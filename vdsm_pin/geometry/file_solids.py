@@ -9,13 +9,19 @@ from functools import cached_property
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows, frozen
+from vdsm_pin.geometry.arrays import (
+    ByValue,
+    FloatArray,
+    IntArray,
+    distinct_rows,
+    frozen,
+)
 from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls, ends_of, placed_piece
 from vdsm_pin.geometry.primitives import BOX_CORNERS, NamedSolid
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class FromFile(NamedSolid):
     """What stands in a file of its own.
 
@@ -29,7 +35,7 @@ class FromFile(NamedSolid):
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mesh(FromFile):
     """Triangles, and the inside of the closed surface that they make.
 
@@ -88,8 +94,8 @@ class Mesh(FromFile):
         return not self.is_surface and self.closed_mesh.closed
 
 
-@dataclass(frozen=True)
-class ConvexCover:
+@dataclass(frozen=True, eq=False)
+class ConvexCover(ByValue):
     """Convex pieces that hold a solid: a mesh's hull, or a link of another robot.
 
     Args:
@@ -121,7 +127,7 @@ class ConvexCover:
         return float(np.linalg.norm(self.corners, axis=1).max()) + self.grown
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PointCloud(FromFile):
     """Measured points, each a ball of the scan's error.
 
@@ -151,7 +157,7 @@ class PointCloud(FromFile):
         return self.radius
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Voxels(FromFile):
     """Occupied cells of a grid, each a cuboid; they need not touch.
 

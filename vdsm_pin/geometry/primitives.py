@@ -8,7 +8,14 @@ from typing import Any, ClassVar, Final, NoReturn, Self
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, called, frozen, is_rotation, is_unit
+from vdsm_pin.geometry.arrays import (
+    ByValue,
+    FloatArray,
+    called,
+    frozen,
+    is_rotation,
+    is_unit,
+)
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.text import UNSEEN
 
@@ -27,8 +34,8 @@ _SHAPES: Final = (
 """Of the fields of solids that have one shape."""
 
 
-@dataclass(frozen=True)
-class NamedSolid:
+@dataclass(frozen=True, eq=False)
+class NamedSolid(ByValue):
     """What all solids have in common; each says which of its fields are what.
 
     Args:
@@ -109,7 +116,7 @@ class NamedSolid:
             self._refuse(f"{field} have shape {rows.shape}, expected (n, 3)")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sphere(NamedSolid):
     """A ball.
 
@@ -134,7 +141,7 @@ class Sphere(NamedSolid):
         return self.radius
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Axial(NamedSolid):
     """A solid of revolution."""
 
@@ -189,7 +196,7 @@ class Cylinder(_Axial):
         return (FlatCylinder(self.centre, self.axis, self.half_length, self.radius),)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Box(NamedSolid):
     """A cuboid.
 
@@ -216,7 +223,7 @@ class Box(NamedSolid):
         return frozen(self.centre + (BOX_CORNERS * self.half_size) @ self.rotation.T)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Prism(NamedSolid):
     """A simple polygon swept along its normal.
 
@@ -281,7 +288,7 @@ class Prism(NamedSolid):
         return frozen(self.origin + np.vstack(ends) @ self.rotation.T)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HalfSpace(NamedSolid):
     """Everything on one side of a plane: (p - point) . normal <= 0.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import (
+    ByValue,
     FloatArray,
     check_numbers,
     freeze,
@@ -43,8 +44,8 @@ class Order(StrEnum):
     FREE = "free"
 
 
-@dataclass(frozen=True)
-class DesiredPath:
+@dataclass(frozen=True, eq=False)
+class DesiredPath(ByValue):
     """What the tip shall draw, in the base frame.
 
     Args:

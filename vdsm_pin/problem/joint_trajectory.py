@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze
+from vdsm_pin.geometry.arrays import BoolArray, ByValue, FloatArray, freeze
 from vdsm_pin.notebook import Summarised
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JointTrajectory(Summarised):
+class JointTrajectory(Summarised, ByValue):
     """Waypoints of named joints.
 
     Straight lines join them; cubic pieces where there are times and rates, and quintic

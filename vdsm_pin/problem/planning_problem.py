@@ -8,7 +8,13 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput, UnknownName
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, check_numbers, freeze
+from vdsm_pin.geometry.arrays import (
+    BoolArray,
+    ByValue,
+    FloatArray,
+    check_numbers,
+    freeze,
+)
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -22,8 +28,8 @@ if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
     from vdsm_pin.geometry.pieces import PackedPieces
 
 
-@dataclass(frozen=True)
-class Posture:
+@dataclass(frozen=True, eq=False)
+class Posture(ByValue):
     """Where the arm stands, in the base frame.
 
     Args:
@@ -41,8 +47,8 @@ class Posture:
         freeze(self, "tip", "joints")
 
 
-@dataclass(frozen=True, repr=False)
-class PlanningProblem(AnyProblem):
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanningProblem(AnyProblem, ByValue):
     """All the planner may read, in the base frame: x along the rail.
 
     Args:

@@ -9,6 +9,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import (
     BoolArray,
+    ByValue,
     FloatArray,
     check_numbers,
     freeze,
@@ -20,8 +21,8 @@ WIDEST: Final = np.pi / 2.0
 """Cones are narrower than this; [rad]."""
 
 
-@dataclass(frozen=True)
-class Pointing:
+@dataclass(frozen=True, eq=False)
+class Pointing(ByValue):
     """A cone in which the axis of the last link lies wherever the tip draws.
 
     The cone's axis runs from the tip to a target, or has a given direction, or one that

@@ -6,12 +6,12 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput, NoPlanFound
-from vdsm_pin.geometry.arrays import FloatArray, freeze
+from vdsm_pin.geometry.arrays import ByValue, FloatArray, freeze
 from vdsm_pin.units import in_mm
 
 
-@dataclass(frozen=True)
-class OtherRatios:
+@dataclass(frozen=True, eq=False)
+class OtherRatios(ByValue):
     """Projections P_i = k_i T with ratios of the user's own.
 
     Args:
@@ -49,8 +49,8 @@ class OtherRatios:
         return np.asarray(ratios[:, None] * tip[:, None, :])
 
 
-@dataclass(frozen=True)
-class ScalingCentre:
+@dataclass(frozen=True, eq=False)
+class ScalingCentre(ByValue):
     """One joint stays over a centre C, about which the joints after it are scaled.
 
     P_i = C + k_i (T - C) after joint m, with k_i = (s_i - s_m) / (s_{N+1} - s_m), and

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze, frozen, same_arrays
+from vdsm_pin.geometry.arrays import (
+    BoolArray,
+    ByValue,
+    FloatArray,
+    freeze,
+    frozen,
+    same_arrays,
+)
 from vdsm_pin.geometry.bernstein import derivative, value
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES
@@ -33,8 +40,8 @@ BETWEEN: Final = ("times", "rates", "changes")
 """Those that tell what lies between them; None where not known."""
 
 
-@dataclass(frozen=True, repr=False)
-class Trajectory(Summarised):
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Summarised, ByValue):
     """What a planner hands over and a verifier judges.
 
     Args:
