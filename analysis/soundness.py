@@ -52,6 +52,7 @@ from vdsm_pin.arm.bodies import arm_bodies
 from vdsm_pin.arm.tree import arm_tree, link_frame
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.solids import ConvexCover
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -171,11 +172,8 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
 
 
 @dataclass(frozen=True)
-class _Body:
-    """An obstacle of stated pieces; stands in for those of the scene module."""
-
-    name: str
-    pieces: tuple[Any, ...]
+class _Body(ConvexCover):
+    """An obstacle of stated pieces, half-spaces among them."""
 
     @property
     def reach(self) -> float:
