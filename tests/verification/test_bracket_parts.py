@@ -33,6 +33,7 @@ from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import (
     clearance,
+    clearances,
     coal_missing,
     counterexample,
     proved_lowers,
@@ -768,3 +769,39 @@ def test_rows_of_what_moves_stand_behind_those_of_the_arm() -> None:
     assert found[:, 0].tolist() == [0.5, 1.25]
     assert found[:, -1] == pytest.approx([11.0, 13.0])  # at 3.5 and 4.5 s
     assert np.array_equal(whole_rows(problem, alone, moments), found[:, :-1])
+
+
+def test_a_profile_has_a_column_for_each_link_and_each_obstacle() -> None:
+    """The feed, behind the base, counts with link 1; links among them with none."""
+    arm, n = replace(ARM, feed=Feed(0.3, 0.05)), ARM.n_links
+    balls = tuple(Sphere(f"b{k}", np.array([9.0, k, 9.0]), 0.1) for k in range(3))
+    asked = arm_assembly(PlanningProblem("p", arm, Scene(balls), None, 0.0, np.eye(4)))
+    question, task = asked.question, asked.question.task
+    assert question.n_columns == n + 3
+    links = [max(link, 1) - 1 for link in asked.links]
+    assert task.bodies.column.tolist() == links == [*range(n), 0]
+    others = [int(k) - len(asked.own) for k in asked.table.one]
+    expected = [n + k if k >= 0 else -1 for k in others]
+    assert task.pairs.column.tolist() == expected
+    assert {*expected} == {-1, n, n + 1, n + 2}
+
+
+def test_no_ball_is_looked_for_when_time_is_over() -> None:
+    zeros, points = np.zeros(2), np.zeros((2, 3))
+    least: Any = LeastClearances(
+        np.zeros(2, np.int64),
+        zeros,
+        zeros,
+        zeros,
+        np.full(2, UNDECIDED),
+        points,
+        points,
+    )
+    path = Path(np.zeros((2, 1)))
+    motion: Any = SimpleNamespace(asked=None, path=path, span=np.array([0.0, 1.0]))
+    pairs, over = np.arange(2), Deadline.after(0.0)
+    found = clearances.with_balls(motion, least, pairs, deadline=over)
+    for name in (one.name for one in fields(least)):
+        np.testing.assert_array_equal(getattr(found, name), getattr(least, name))
+    with pytest.raises(AttributeError):  # it asks for poses otherwise
+        clearances.with_balls(motion, least, pairs)

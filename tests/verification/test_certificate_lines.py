@@ -10,7 +10,7 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from vdsm_pin.certificate_checker.program import VERSION
-from vdsm_pin.certificate_writer.arm import _triangles
+from vdsm_pin.certificate_writer.arm import _triangles, pieces_of_obstacles
 from vdsm_pin.certificate_writer.lines import PER_METRE, _counted
 from vdsm_pin.certificate_writer.links import link_pieces
 from vdsm_pin.certificate_writer.schema import (
@@ -22,6 +22,7 @@ from vdsm_pin.certificate_writer.schema import (
     Primitive,
 )
 from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.solids import BOX_CORNERS, Prism
 
 
@@ -93,6 +94,19 @@ def test_triangles_of_a_prism_run_as_its_polygon(turned: int) -> None:
         areas = [_area(prism.polygon[k]) for k in _triangles(prism)]
         assert all(area * turned > 0.0 for area in areas)
         assert sum(areas) == pytest.approx(_area(prism.polygon), rel=1e-9)
+
+
+def test_prisms_of_several_pieces_are_told_by_them() -> None:
+    """Of one piece nothing is told; planes count the pieces in the order packed."""
+    inward = {1: [[0, 0], [2, 0], [2, 2], [0, 2]], 2: [[0, 0], [2, -1], [1, 0], [2, 1]]}
+    for count, polygon in inward.items():
+        prism = Prism("bar", np.zeros(3), np.eye(3), np.array(polygon, float), (0, 1))
+        assert len(prism.pieces) == count
+        told = pieces_of_obstacles([(0, prism)], pack_pieces([prism.pieces]))
+        assert [*told] == (["bar"] if count > 1 else [])
+        areas = [_area(prism.polygon[loop]) for loop in told.get("bar", [])]
+        assert len(areas) == (count if count > 1 else 0)
+        assert sum(areas) in (0.0, pytest.approx(_area(prism.polygon)))
 
 
 def _area(corners: np.ndarray) -> float:
