@@ -54,6 +54,7 @@ GROUPS: Final = (
             "tests/verification/test_half_laps.py",
             "tests/verification/test_other_arms.py",
             "tests/robots/test_arm_and_robot.py",
+            "tests/robots/test_scenes.py",
             "tests/robots/test_trajectories.py",
         ),
     ),
@@ -72,6 +73,9 @@ GROUPS: Final = (
             "tests/geometry/test_closed_meshes.py",
             "tests/geometry/test_mesh_parts.py",
             "tests/geometry/test_winding.py",
+            "tests/robots/test_moving_beside_robots.py",
+            "tests/robots/test_robot_first_contact.py",
+            "tests/robots/test_two_robots.py",
         ),
     ),
     Group(
