@@ -92,3 +92,6 @@ def test_a_refuted_clearance_is_told_as_what_two_points_prove() -> None:
     row = next(one for one in found.checks if one.name == "clearance from obstacles")
     told = reason(replace(found, checks=(row,)))
     assert "clearance from obstacles is at most −31.499 mm against" in told
+    near = replace(row, worst=0.0049996, limit=0.005)
+    told = reason(replace(found, checks=(near,)))
+    assert "clearance from obstacles is 4.999 mm against a limit of 5.000 mm" in told

@@ -11,6 +11,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.rows import LeftOutRow
 from vdsm_pin.report.words import (
     at_least,
+    at_most,
     check_cells,
     finite,
     percent,
@@ -60,7 +61,7 @@ def reason(verification: Verification) -> str:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
     worst, asked = check_cells(first)
-    found = f"{first.name} is {_bound(first)}{worst}"
+    found = f"{first.name} is {_bound(first, worst)}{worst}"
     inside = first.name in (ARM_OUTSIDE, LINKS_OUTSIDE)
     if inside:
         found = first.where
@@ -80,15 +81,17 @@ def reason(verification: Verification) -> str:
     return f"{undecided} This counts as not passed."
 
 
-def _bound(check: Check) -> str:
+def _bound(check: Check, told: str) -> str:
     """What the worst value of a check that did not pass is of the true one, in words.
 
-    A clearance that is refuted is as small as two points are apart, perhaps smaller.
+    A clearance that is refuted is as small as two points are apart, perhaps smaller;
+    where it is told rounded down, lest it reads as its limit, it is not at most that.
     """
     if check.name not in (LINKS, OBSTACLES) or check.deeper:
         return ""
-    refuted = check.verdict is Verdict.REFUTED
-    return "at most " if refuted else "proved to be at least "
+    if check.verdict is Verdict.REFUTED:
+        return "at most " if told == at_most(check.worst) else ""
+    return "proved to be at least "
 
 
 def plan_reason(plan: Plan, verification: ArmVerification) -> str:
