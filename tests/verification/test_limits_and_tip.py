@@ -172,6 +172,7 @@ def test_what_is_not_proved_to_be_drawn_is_not_covered() -> None:
     np.testing.assert_allclose(report.undrawn, [[0.16, 0.18]], atol=1e-9)
     row = named(report.checks, "coverage")
     assert (row.verdict, row.worst) == (Verdict.INCOMPLETE, report.coverage)
+    assert row.where == "waypoints off it do not count: 1"
     # Rows that say they draw all of it, while the arm does not move.
     still = {n: 0.0 * getattr(motion, n) for n in ("x0", "alpha", "theta")}
     report = check_tip(problem, replace(motion, **still))

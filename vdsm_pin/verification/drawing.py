@@ -196,12 +196,15 @@ def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check
     )
 
 
-def check_coverage(problem: PlanningProblem, share: float) -> tuple[Check, ...]:
+def check_coverage(
+    problem: PlanningProblem, share: float, off: int = 0
+) -> tuple[Check, ...]:
     """Whether as much is drawn as the problem asks for.
 
     Args:
         problem: With the required coverage.
         share: Proved coverage; [-].
+        off: Number of waypoints that say they are on the path and are not.
 
     Returns:
         One row; none where the problem asks for nothing: it could not fail.
@@ -218,5 +221,6 @@ def check_coverage(problem: PlanningProblem, share: float) -> tuple[Check, ...]:
             worst=share,
             limit=needed,
             unit="share",
+            where=f"waypoints off it do not count: {off}" if off else "",
         ),
     )

@@ -215,7 +215,7 @@ def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
         _row_check(problem, trajectory, tips),
         *_between_check(problem, trajectory, deviation, interval),
         *check_order(problem, trajectory),
-        *check_coverage(problem, share),
+        *check_coverage(problem, share, int((trajectory.on_path & ~kept).sum())),
     )
     return TipReport(checks, deviation, share, undrawn)
 
