@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import compiled
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, uncleared
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, paged_zeros
 from vdsm_pin.proof.terms import WORLD
 
 BLOCK: Final = 64
@@ -61,9 +61,9 @@ class Rows(NamedTuple):
 def new_tracks(n_places: int, block: int) -> Tracks:
     """Of places of which none is known: memory is taken where one is written to."""
     return Tracks(
-        uncleared(n_places, 3, block + 1),
-        uncleared(n_places, block),
-        uncleared(n_places, block),
+        paged_zeros(n_places, 3, block + 1),
+        paged_zeros(n_places, block),
+        paged_zeros(n_places, block),
         np.zeros(n_places, np.int64),
     )
 
