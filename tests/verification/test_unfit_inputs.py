@@ -1,5 +1,6 @@
 """What does not fit together is refused before anything is judged of it."""
 
+import json
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,6 +15,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.layouts import FIRST, LAST
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.verification.assembly import obstacle_growth
 from vdsm_pin.verification.coal_bodies import _surface
@@ -40,6 +42,35 @@ def test_a_proof_that_is_not_found_again_is_not_left_out(
     proof: Any = SimpleNamespace(motion=knots, task=None, whole=None)
     with pytest.raises(VerificationFailed, match="interval 1: the proof of pair 4 was"):
         next(lines._lines(proof, NO_LIMIT))
+
+
+def test_a_plane_serves_all_pieces_of_its_own_partner(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where one plane serves a whole solid, as where its inside is not known."""
+    starts = [(0, 0.0), (1, 0.0), (1, 0.5), (2, 0.0)]
+
+    def record(*given: Any) -> tuple[int, int, int]:
+        rows = given[-1]
+        for row, (pair, start) in zip(rows, starts, strict=False):
+            row[1:4], row[[FIRST, LAST]] = (pair, start, start + 0.5), (0.0, 1.0)
+        return len(starts), 1, -1
+
+    monkeypatch.setattr(lines, "new_workspace", lambda *_: None)
+    monkeypatch.setattr(lines, "record", record)
+    pairs = SimpleNamespace(
+        obstacle=np.array([2, 0, 1]), rough=np.zeros((3, 0)), required=np.zeros(3)
+    )
+    proof: Any = SimpleNamespace(
+        motion=SimpleNamespace(knots=np.zeros((2, 1))),
+        task=SimpleNamespace(pairs=pairs),
+        whole=np.array([12, 0, 5]),
+    )
+    (line,) = "".join(lines._lines(proof, NO_LIMIT)).splitlines()
+    ends = [
+        [planes[0][1] for _, _, planes in one] for one in json.loads(line)["proofs"]
+    ]
+    assert ends == [[5], [12, 12], [1]]
 
 
 def test_how_far_errors_move_the_surface_of_an_obstacle() -> None:
