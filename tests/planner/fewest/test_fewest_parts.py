@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
-from vdsm_pin.arm.kinematics import joint_angles, link_angles
+from vdsm_pin.arm.kinematics import joint_angles, joint_centres, link_angles
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.interval_parts import bow_bounds
 from vdsm_pin.planner.fewest.judge import Judge
@@ -133,6 +134,41 @@ def test_a_motion_through_a_thin_plate_is_refused_though_both_ends_are_clear() -
     free = problem()
     judge = Judge(free, link_clearance(free), 0.0, 0.0, 2e-3)
     assert judge.clear(Intervals(a, b, zero, zero))[0]
+
+
+def test_no_interval_is_clear_that_bends_too_far_between_its_ends() -> None:
+    """Oracle: link angles at 400 places of each interval.
+
+    On a fixed base the first link makes up for what the others leave, so that an
+    interval bends most anywhere.
+    """
+    rng = np.random.default_rng(5)
+    fixed = replace(ARM, base_range=(0.0, 0.0))
+    task = replace(problem(), manipulator=fixed)
+    limit, count = ARM.max_link_angle, 1000
+    psi = limit * rng.uniform(0.6, 0.999, (count, 2, 8))
+    around = rng.uniform(0.0, 2.0 * np.pi, (count, 1, 8))
+    around = around + rng.normal(0.0, 0.3, (count, 2, 8))
+    theta = -np.arcsin(np.sin(psi) * np.sin(around)).reshape(-1, 8)
+    alpha = np.arctan2(np.sin(psi) * np.cos(around), np.cos(psi)).reshape(-1, 8)
+    centres = joint_centres(fixed, np.zeros(2 * count), alpha, theta)
+    axes = coordinates(fixed, centres, directed=True).reshape(count, 2, 8, 3)
+    tips = centres[:, -1].reshape(count, 2, 3)
+    lines = Intervals(tips[:, 0], tips[:, 1], axes[:, 0], axes[:, 1])
+    places, number = np.linspace(0.0, 1.0, 401), np.arange(count)
+    bends = np.stack(
+        [
+            bends_of(lines.centres(fixed, number, np.full(count, share))).max(axis=1)
+            for share in places
+        ]
+    )
+    few = np.isfinite(bends).all(axis=0) & (bends[::100] <= limit).all(axis=0)
+    hidden = few & (bends.max(axis=0) > limit + TOLERANCES.joint_limit)
+    assert hidden.sum() > 5
+    judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)
+    clear = judge.clear(lines)
+    assert not clear[hidden].any()
+    assert clear[few & (bends.max(axis=0) <= limit)].all()
 
 
 def wandering(task: PlanningProblem, seed: int, count: int) -> Intervals:

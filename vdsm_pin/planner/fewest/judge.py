@@ -27,6 +27,9 @@ NEAR_LIMIT: Final = 0.9
 """An interval is looked at for its link angles if an end has so much of the largest."""
 PLACES: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 """Places of an interval at which it is seen where the last link looks; [-]."""
+STEPS: Final = tuple(0.5 ** (2 + k) for k in range(10))
+"""Steps to the place of an interval where a link bends most, one after the other; [-].
+"""
 STEADY: Final = 2e-4
 """More of its cone that is kept in reserve; [rad]."""
 THIRDS: Final = 40
@@ -311,14 +314,36 @@ class Judge:
         arm, kept = self.problem.manipulator, np.ones(len(most), dtype=np.bool_)
         peak = np.maximum(bends_of(begin).max(axis=1), bends_of(end).max(axis=1))
         near = np.flatnonzero(peak > NEAR_LIMIT * most)
-        for share in (0.25, 0.5, 0.75) if near.size else ():
-            inner = intervals.centres(arm, near, np.full(len(near), share))
-            kept[near] &= bends_of(inner).max(axis=1) <= most[near]
+        if near.size:
+            kept[near] = self._most_bent(intervals, near, most[near])
         kept &= self._looking(intervals)
         ahead = np.minimum(begin[:, -1, 0], end[:, -1, 0])
         near = np.flatnonzero(kept & (ahead - arm.total_length < arm.base_range[0]))
         if near.size:
             kept[near] = self._farthest_back(intervals, near) >= arm.base_range[0]
+        return kept
+
+    def _most_bent(
+        self, intervals: Intervals, number: IntArray, most: FloatArray
+    ) -> BoolArray:
+        """Whether link angles keep a limit [rad] where intervals bend most, (r,).
+
+        That place is sought about the middle, in ever smaller steps to the more bent
+        side, until it is found or the limit is passed.
+        """
+        arm, at = self.problem.manipulator, np.full(len(number), 0.5)
+        kept = np.ones(len(number), dtype=np.bool_)
+        best = bends_of(intervals.centres(arm, number, at)).max(axis=1)
+        for step in STEPS:
+            near = kept & ((best > NEAR_LIMIT * most) | (step == STEPS[0]))
+            some = np.flatnonzero(near)
+            middle = at[some]
+            for share in (middle - step, middle + step) if some.size else ():
+                inner = intervals.centres(arm, number[some], share)
+                bent = bends_of(inner).max(axis=1)
+                more = bent > best[some]
+                at[some[more]], best[some[more]] = share[more], bent[more]
+            kept[best > most] = False
         return kept
 
     def _looking(self, intervals: Intervals) -> BoolArray:
