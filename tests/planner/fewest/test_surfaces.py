@@ -5,13 +5,14 @@ import pytest
 import trimesh
 from scenes_for_fewest import problem
 
-from vdsm_pin.geometry.solids import Mesh
+from vdsm_pin.geometry.solids import Box, Mesh, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.mesh_distance import STEP, surfaces_of
 from vdsm_pin.problem.held import Axes
 from vdsm_pin.verification.link_clearance import link_clearance
 
 REACH = 0.3
+AXES = np.eye(3)
 
 
 def mesh(solid: trimesh.Trimesh, centre: tuple[float, float, float]) -> Mesh:
@@ -78,6 +79,29 @@ def test_below_the_floor_nothing_is_known_and_above_it_nothing_is_lost(
 def test_a_scene_without_meshes_has_no_surfaces() -> None:
     distances = surfaces_of(()).least(np.zeros((2, 2, 3)), 0.0, REACH)
     assert distances.tolist() == [np.inf] * 2
+
+
+def test_what_is_near_beside_a_mesh_is_measured_without_the_mesh() -> None:
+    """Oracle: the clearance function, which knows all obstacles; it is never asked."""
+    centre = np.array([2.0, 0.1, -0.2])
+    task = problem(
+        RING, Sphere("ball", centre, 0.15), Box("box", centre, AXES, AXES[0] + 0.1)
+    )
+    exact = link_clearance(task)
+
+    def never(_: np.ndarray, axes: Axes = None, /) -> np.ndarray:
+        raise AssertionError(axes)
+
+    segments = np.random.default_rng(8).uniform(-0.7, 0.7, (3000, 2, 3)) + centre
+    quick = broad_phase(task, never)
+    bound, truth = quick(segments)[:, 0], exact(segments)[:, 0]
+    near = truth < quick.far - 2.0 * STEP
+    clear = near & (truth >= task.required_clearance)
+    assert clear.sum() > 300
+    assert (bound[clear] <= truth[clear] + 1e-9).all()
+    assert (bound[clear] >= truth[clear] - 2.0 * STEP - 1e-9).all()
+    assert (bound[truth < task.required_clearance] < task.required_clearance).all()
+    assert (bound[~near] >= quick.far - 3.0 * STEP).all()
 
 
 def test_the_clearance_function_is_asked_where_a_step_decides() -> None:

@@ -2,8 +2,9 @@
 
 Most links are far from most obstacles. Axis-parallel boxes round the obstacles and
 round a few stretches of each link give a lower bound of the clearance at once, and the
-distance from a mesh is known but for rounding. The function passed in is asked only
-where they leave a doubt.
+distance from a mesh is known but for rounding. Where boxes leave a doubt, the function
+passed in is asked; beside meshes, which it would look at again, the other obstacles
+alone are measured.
 """
 
 from collections.abc import Sequence
@@ -12,17 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vdsm_pin.compiled import borrowed, compiled
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hulls, Piece
+from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.ordering import coherent_order
-from vdsm_pin.geometry.pieces import HELD, disc_extent
+from vdsm_pin.geometry.pieces import HELD, PackedPieces, disc_extent, pack_pieces
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.planner.fewest.mesh_distance import STEP, Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.problem.held import Axes, HeldApart, HeldGroup
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Obstacle
+from vdsm_pin.problem.scene import Obstacle, covers_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -45,12 +47,16 @@ class Cover:
         boxes: Low and high corners of boxes that cover the obstacles, (b, 2, 3); [m].
         planes: Outward normals and offsets of the half-spaces, shape (p, 4).
         surfaces: The meshes, which have no boxes.
+        others: All but the meshes.
+        insides: What measuring them asks for, of meshes alone.
         group: Says which obstacles and axes they are.
     """
 
     boxes: FloatArray
     planes: FloatArray
     surfaces: Surfaces
+    others: PackedPieces
+    insides: IntArray
     group: HeldGroup
 
     @classmethod
@@ -65,7 +71,9 @@ class Cover:
             if isinstance(piece, HalfSpacePiece)
         ]
         boxes = np.concatenate([np.zeros((0, 2, 3)), *covers])
-        return cls(boxes, np.array(flat).reshape(-1, 4), surfaces_of(obstacles), group)
+        planes, surfaces = np.array(flat).reshape(-1, 4), surfaces_of(obstacles)
+        others = pack_pieces([one.pieces for one in solid])
+        return cls(boxes, planes, surfaces, others, covers_of(solid, others), group)
 
     def bounds(
         self,
@@ -83,6 +91,19 @@ class Cover:
         least = floor + radii.min(initial=self.group.radius)
         mesh = self.surfaces.least(ends, least, most, deadline)
         return boxes - radii, mesh - radii
+
+    def beside_meshes(
+        self, ends: FloatArray, number: IntArray | None
+    ) -> tuple[IntArray, FloatArray]:
+        """Clearance from all but meshes, up to two steps less: whose, and how much.
+
+        Args:
+            ends: Shape (n, 2, 3); [m].
+            number: Which axis each is of, shape (n,); None where all are alike.
+        """
+        which, some, radii = self.group.held(ends, number)
+        gaps = link_clearances(self.others, self.insides, some, 0.0, STEP, STEP)
+        return which, gaps[:, 0] - radii
 
 
 @dataclass(frozen=True)
@@ -126,13 +147,22 @@ class BroadPhase:
         near = clearances < self.far
         near |= mesh < min(self.far, self.floor + STEP)
         np.minimum(clearances, mesh, out=clearances)
-        asked = np.flatnonzero(near)
+        blocked = near & (mesh < self.floor - STEP)
+        clearances[blocked] = -np.inf
+        near &= ~blocked
+        # Where no step of a mesh decides, what is beside meshes is measured alone.
+        alone = near & (mesh >= self.floor + STEP) & (mesh < np.inf)
+        asked = np.flatnonzero(near & ~alone)
         if asked.size:
-            blocked = mesh[asked] < self.floor - STEP
-            clearances[asked[blocked]] = -np.inf
-            asked = asked[~blocked]
             of = None if number is None else number[asked, None]
             clearances[asked] = self.clearance(ends[asked], of)[:, 0]
+        asked = np.flatnonzero(alone)
+        if asked.size:
+            clearances[asked] = mesh[asked]
+            of = None if number is None else number[asked]
+            for cover in self.covers:
+                which, gaps = cover.beside_meshes(ends[asked], of)
+                np.minimum.at(clearances, asked[which], gaps)
         return clearances.reshape(shape)
 
     def up_to(self, far: float) -> "BroadPhase":
