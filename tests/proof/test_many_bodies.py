@@ -1,5 +1,7 @@
 """Many bodies, where boxes settle most pairs: oracle, distances at many times."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from oracles.tree_queries import (
@@ -14,14 +16,16 @@ from oracles.tree_queries import (
     wrong_poses,
 )
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, same_arrays
 from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.proof import rows, workspace
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.broad_phase import FEW
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove, start_proof
 from vdsm_pin.proof.proving import dense_rows
+from vdsm_pin.proof.row_places import FEW_PLACES
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.proof.tree import Joint, Kind, Tree
@@ -233,3 +237,27 @@ def test_no_wrong_pose_comes_nearer_than_is_proved(seed: int) -> None:
         for pair, lower in zip(pairs, proof.lower, strict=True):
             two = bodies[pair.one], bodies[pair.other]
             assert clearances(tree, two, poses[None])[0] >= lower - 1e-9 or lower < 0.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_is_read_that_was_not_written(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Places of corners and slices are used that were found: the rest may be NaN."""
+    rng = np.random.default_rng([seed, 29])
+    tree, bodies, path = random_scene(rng)
+    for k in range(3):
+        corners = np.array([0.2 * unit(rng) for _ in range(FEW_PLACES // 2)])
+        bodies[k] = Body(bodies[k].frame, (Hull(corners),))
+    pairs, shapes = pairs_of(bodies), list[tuple[int, ...]]()
+
+    def filled(*shape: int) -> FloatArray:
+        shapes.append(shape)
+        return np.full(shape, np.nan)
+
+    usual = prove(tree, bodies, path, pairs)
+    for module in (rows, workspace):
+        monkeypatch.setattr(module, "uncleared", filled)
+    found = prove(tree, bodies, path, pairs)
+    assert same_arrays(found, usual, [one.name for one in fields(Proof)])
+    assert max(shape[0] for shape in shapes) > FEW_PLACES

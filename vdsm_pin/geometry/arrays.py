@@ -23,6 +23,9 @@ ByteArray: TypeAlias = npt.NDArray[np.uint8]
 PAGES: Final = 1 << 18
 """From so many bytes on zeros are taken page by page."""
 
+MANY_PAGES: Final = 1 << 25
+"""From so many bytes on memory that was given back is not given out again."""
+
 
 def paged_zeros(*shape: int) -> FloatArray:
     """Zeros of which only the pages that something is written to cost time and memory.
@@ -40,6 +43,20 @@ def paged_zeros(*shape: int) -> FloatArray:
         return np.frombuffer(pages, np.float64).reshape(shape)
     except (OSError, OverflowError) as error:
         raise MemoryError(*error.args) from None
+
+
+def uncleared(*shape: int) -> FloatArray:
+    """Room for numbers, which hold anything; much of it costs where it is written to.
+
+    What was given back is given out again: no time goes into new pages.
+
+    Raises:
+        MemoryError: If there are no such addresses.
+    """
+    size = prod(shape) * np.dtype(np.float64).itemsize
+    if size < MANY_PAGES:
+        return np.empty(shape)  # noqa: TID251 (whoever asks writes before they read)
+    return paged_zeros(*shape)
 
 
 def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import compiled
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, paged_zeros
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, paged_zeros, uncleared
 from vdsm_pin.proof.terms import WORLD
 
 BLOCK: Final = 64
@@ -22,7 +22,7 @@ class Tracks(NamedTuple):
     Args:
         places: In their frames at rest, shape (n_places, 3, BLOCK + 1); [m].
         sags: M/8, how far places may leave their chords, (n_places, BLOCK); [m].
-        drifts: D of places, only where errors turn, the same shape; [m].
+        drifts: D of places, 0 where no errors turn, the same shape; [m].
         known: Number of the block over which each place is known, shape (n_places,);
             the others hold anything.
     """
@@ -61,8 +61,8 @@ class Rows(NamedTuple):
 def new_tracks(n_places: int, block: int) -> Tracks:
     """Of places of which none is known: memory is taken where one is written to."""
     return Tracks(
-        paged_zeros(n_places, 3, block + 1),
-        paged_zeros(n_places, block),
+        uncleared(n_places, 3, block + 1),
+        uncleared(n_places, block),
         paged_zeros(n_places, block),
         np.zeros(n_places, np.int64),
     )

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import apart, compiled
-from vdsm_pin.geometry.arrays import FloatArray, paged_zeros
+from vdsm_pin.geometry.arrays import FloatArray, uncleared
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
 from vdsm_pin.proof.packed_tree import REVOLUTE, Pose
@@ -66,7 +66,7 @@ def new_workspace(
     held = HELD_AT + 3 * corners if many else HELD_AT
     planes = np.zeros((len(task.pairs.rough), held))
     tracks = new_tracks(task.places.way.size, block)
-    intervals = paged_zeros(candidates + budget, SLICE)
+    intervals = uncleared(candidates + budget, SLICE)
     forget(planes)
     return Workspace(
         new_rows(n_joints + 1, n_ways, tracks, block),
