@@ -535,6 +535,16 @@ def test_vertices_that_no_triangle_names_may_be_anything(
         assert len(read_mesh(path).triangles) == 1
 
 
+@pytest.mark.parametrize("element", ["element a 0\nproperty int b", "element a 3"])
+def test_elements_of_a_ply_without_values_take_no_bytes(
+    tmp_path: Path, element: str
+) -> None:
+    content = trimesh.creation.box().export(file_type="ply")
+    assert b"binary" in content
+    more = content.replace(b"element vertex", element.encode() + b"\nelement vertex")
+    assert len(read_mesh(write(tmp_path, "a.ply", more)).triangles) == 12
+
+
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
