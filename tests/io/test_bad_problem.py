@@ -336,6 +336,7 @@ NOT_PLAIN_YAML = [
     (b"\n", "holds no data"),
     (b"# nothing\n", "holds no data"),
     (b"- 1\n", "line 1: is [1], expected a mapping"),
+    (b'<?xml version="1.0"?>\n<robot name="a"/>\n', "which may name a URDF"),
     (b"vdsm_problem: 1\nname: \xff\n", "line 2: is not UTF-8 text (byte 0xff)"),
     ("vdsm_problem: 1\n".encode("utf-16"), "line 1: is not UTF-8 text (byte 0xff)"),
     (b"a: \x01\n", "is not YAML: unacceptable character"),

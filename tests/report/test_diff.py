@@ -117,6 +117,9 @@ def test_a_summary_that_no_batch_writes_is_refused(
 def test_other_folders_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidFile, match="neither"):
         compare_folders(tmp_path, tmp_path)
+    (tmp_path / "a.json").write_text("{}")
+    with pytest.raises(InvalidFile, match="is a file, expected a folder"):
+        compare_folders(tmp_path / "a.json", tmp_path)
     (tmp_path / "summary.csv").write_text("outcome\nsplendid\n")
     with pytest.raises(InvalidFile, match="folder: Field required; was it written"):
         compare_folders(tmp_path, tmp_path)

@@ -48,6 +48,12 @@ def names(robot: Robot) -> list[str]:
     return [joint.name for joint in robot.joints]
 
 
+def test_a_urdf_in_place_of_a_srdf_is_refused(urdf: Path) -> None:
+    """It disables no pair, so that neighbours would be held apart."""
+    with pytest.raises(InvalidFile, match=r"two.urdf: is a URDF, .* expected a SRDF"):
+        read_robot(RobotFiles(urdf, urdf))
+
+
 def test_a_group_says_which_joints_move(tmp_path: Path, urdf: Path) -> None:
     srdf = write(tmp_path, "two.srdf", SRDF)
     assert names(read_robot(RobotFiles(urdf, srdf, group="arm"))) == ["turn", "slide"]

@@ -49,7 +49,11 @@ def read_problem(
     """
     path = find_problem(name_or_path)
     content = read_bytes(path, limit=MAX_PROBLEM_BYTES)
-    document = read_yaml(decode(content, path), file=path)
+    text = decode(content, path)
+    if text.lstrip().startswith(("<?xml", "<robot", "<!--")):
+        what = "is XML, expected a problem file, which may name a URDF"
+        raise InvalidFile(file=path, problem=what)
+    document = read_yaml(text, file=path)
     if isinstance(document.data, dict) and "robot" in document.data:
         line = document.line(("robot",))
         where = "robot" if line is None else f"robot (line {line})"

@@ -149,5 +149,7 @@ def _rows(folder: Path) -> dict[str, BatchRow]:
         raise InvalidFile(file=folder, problem=problem) from error
     except (OSError, ValueError, csv.Error) as error:
         raise InvalidFile(file=folder, problem=f"cannot be read: {error}") from error
+    if folder.is_file():
+        raise InvalidFile(file=folder, problem="is a file, expected a folder")
     what = "holds neither summary.csv nor verification.json"
     raise InvalidFile(file=folder, problem=what)

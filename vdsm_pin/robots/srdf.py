@@ -47,6 +47,9 @@ class Srdf:
         if self._root.tag != "robot":
             problem = f"root element is <{self._root.tag}>, expected <robot>"
             raise self._invalid(problem)
+        if self._root.find("joint/parent") is not None:
+            problem = "is a URDF, with joints between links; expected a SRDF"
+            raise self._invalid(problem)
         self._links = {link.get("name", "") for link in robot.findall("link")}
         self._joints = {
             joint.get("name", ""): joint for joint in robot.findall("joint")
