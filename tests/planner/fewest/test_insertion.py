@@ -121,6 +121,40 @@ def off_curve(points: FloatArray, curve: FloatArray) -> float:
     return float(gaps.min(axis=1).max())
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_tip_finds_its_way_through_a_slot_hardly_wider_than_the_body(
+    seed: int,
+) -> None:
+    """Oracle: the plates' planes, and posts between them.
+
+    The slot leaves the tip 0.6 mm, far less than the smallest cells.
+    """
+    rng = np.random.default_rng([12, seed])
+    turn = rng.uniform(0.0, np.pi)
+    up = np.array([0.0, -np.sin(turn), np.cos(turn)])
+    R = np.column_stack([[1.0, 0.0, 0.0], np.cross(up, [1.0, 0.0, 0.0]), up])
+    keep = ARM.link_radius + 0.0035 + 3e-4
+    gap, thick = keep + 3e-4, 0.1
+    plates = [
+        Box(f"plate{side}", R @ [1.4, 0.0, side * (gap + thick)], R, [1.2, 1.3, thick])
+        for side in (-1.0, 1.0)
+    ]
+    posts = [
+        Cylinder(f"post{k}", R @ [0.5 + 0.4 * k, y, 0.0], up, gap, 0.12)
+        for k, y in enumerate(rng.uniform(-0.15, 0.15, 3))
+    ]
+    goal = R @ [1.75, 0.1, 0.0]
+    task = problem(*plates, *posts, points=np.stack([goal, goal]), start=START)
+    _, route = space_of(task)._begun(goal)
+    assert route is not None
+    places = resampled(route, 0.002) @ R
+    within = (places[:, 0] > 0.2) & (places[:, 0] < 2.6)
+    assert np.abs(places[within, 2]).max() <= gap - keep + 3e-4 + 1e-9
+    for post in posts:
+        away = np.linalg.norm((places - post.centre @ R)[:, :2], axis=1)
+        assert away.min() >= 0.12 + keep - 3e-4 - 1e-9
+
+
 def test_arms_that_follow_keep_their_links_and_the_curve() -> None:
     rng = np.random.default_rng(4)
     before = bent_arms(rng, 200)

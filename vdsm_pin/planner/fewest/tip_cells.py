@@ -2,7 +2,8 @@
 
 A cell costs its size, and more the narrower it is there for the body; where nobody
 knows yet, it is thought wide. Dijkstra's cheapest way is halved cell by cell until all
-of it is known to be clear.
+of it is known to be clear. A cell is passed at its centre or, where that is too near
+an obstacle, at a place in it farther away: slots far thinner than cells are found so.
 """
 
 from typing import Final
@@ -33,6 +34,11 @@ AROUND: Final = 3.0
 """How near that is, over the body's radius; [-]."""
 CAP: Final = 0.6
 """Room below this part of what is narrow costs no more; [-]."""
+SMALL: Final = 1.0
+"""Half the side, over the body's radius, of the largest cells that are passed at
+another place than their centre: larger ones are halved; [-]."""
+PROBE: Final = 0.02
+"""Step along which the slope of the room is measured, over half a cell's side; [-]."""
 
 
 class TipCells(Octree):
@@ -54,25 +60,59 @@ class TipCells(Octree):
         self.avoided: list[FloatArray] = []
         super().__init__(corner, side)
 
-    def look(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray]:
-        """What the tip has to spare at the centre of each cell, shape (n,); [m]."""
+    def look(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray, ...]:
+        """What the tip has to spare at centres, at places, and these places; [m].
+
+        Returns:
+            Shapes (n,), (n,) and (n, 3).
+        """
         centre, half = self.boxes(codes, levels)
         # From within a solid a tip that is clear is at least so far away.
         least = -self.radius - self.room.required
-        clearances = np.maximum(self.room.spare(centre), least)
+        spare = np.maximum(self.room.spare(centre), least)
         out = np.hypot(centre[:, 1], centre[:, 2]) - self.reach
-        clearances[out > np.sqrt(2.0) * half] = -np.inf
-        return (np.asarray(clearances),)
+        spare[out > np.sqrt(2.0) * half] = -np.inf
+        best, place = spare.copy(), centre.copy()
+        some = (spare < 0.0) & (spare > least) & (spare + np.sqrt(3.0) * half >= 0.0)
+        if some.any():
+            place[some], best[some] = self._away(centre[some], half[some], spare[some])
+        return spare, best, place
+
+    def _away(
+        self, centre: FloatArray, half: FloatArray, spare: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """A place of each cell on the line up the room's slope, and the room there.
+
+        Args:
+            centre: Of the cells, shape (n, 3); [m].
+            half: Half their sides, shape (n,); [m].
+            spare: Room at the centres, shape (n,); [m].
+        """
+        probes = centre[:, None] + PROBE * half[:, None, None] * np.eye(3)
+        slope = self.room.spare(probes.reshape(-1, 3)).reshape(-1, 3) - spare[:, None]
+        slope = np.where(np.isfinite(slope), slope, 0.0)
+        most = np.abs(slope).max(axis=1, keepdims=True)
+        way = slope / np.where(most > 0.0, most, 1.0) * half[:, None]
+        far = np.linalg.norm(way, axis=1)
+        # The room rises by as much as one goes, then falls by as much.
+        rise = self.room.spare(centre + way) - spare
+        part = np.clip((1.0 + rise / np.maximum(far, PROBE * half)) / 2.0, 0.0, 1.0)
+        place = centre + part[:, None] * way
+        best = self.room.spare(place)
+        worse = ~(best > spare)
+        place[worse], best[worse] = centre[worse], spare[worse]
+        return place, best
 
     def costs(self) -> tuple[FloatArray, BoolArray]:
         """Cost of passing each cell, inf where it is shut; whether it is in doubt."""
         centre, half = self.boxes(self.codes, self.levels)
-        (clearances,), radius = self.known, np.sqrt(3.0) * half
-        shut = clearances + radius < 0.0
-        doubt = ~shut & (clearances < half) & (half > LEAST * self.radius)
-        shut |= ~doubt & (clearances < 0.0)
-        # A cell in doubt is taken for as wide as it may be.
-        clearances = np.where(doubt, clearances + radius, clearances)
+        (spare, best, _), radius = self.known, np.sqrt(3.0) * half
+        shut = spare + radius < 0.0
+        passed = (spare < 0.0) & (best >= 0.0) & (half <= SMALL * self.radius)
+        doubt = ~(shut | passed) & (spare < half) & (half > LEAST * self.radius)
+        shut |= ~doubt & (best < 0.0)
+        # A cell that is not clear at its centre is taken for as wide as it may be.
+        clearances = np.where(doubt | passed, spare + radius, best)
         narrow = NARROW * self.radius
         cost = 2.0 * half * (1.0 + (narrow / np.maximum(clearances, CAP * narrow)) ** 2)
         around = AROUND * self.radius + half
@@ -107,33 +147,55 @@ class TipCells(Octree):
             halved = doubt & (there + back <= best + detour + cost)
             route = self._traced(int(ends[1]), int(ends[0]), there, first, neighbours)
             if not doubt[route].any():
-                points = np.vstack([start, self._through(route), goal])
-                halved = self._blocked(route, points)
+                cells, points = self._through(route)
+                points = np.vstack([start, points, goal])
+                halved = self._blocked(route, cells, points)
                 if not halved.any():
                     return points
             if self.codes.size > self.most:
                 return None
             self.split(np.flatnonzero(halved))
 
-    def _blocked(self, route: IntArray, points: FloatArray) -> BoolArray:
-        """Cells to halve, as a way through them is blocked near a corner of theirs.
+    def _through(self, route: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Where a way passes its cells, and where these points are in their order.
 
-        Args:
-            route: Cells of the way, shape (k,).
-            points: Where it enters and leaves them, shape (k + 1, 3); [m].
+        It goes through the centres of the faces between cells that are clear at their
+        centres, and through the clear places of the others but for the first and last.
+
+        Returns:
+            Numbers in the route, a half more on the face to the next cell, shape (m,),
+            and points, shape (m, 3); [m].
         """
-        near = self.room.near.spare(points[:-1], points[1:]) < 0.0
-        half = self.side / 2.0 ** (self.levels[route] + 1.0)
-        picked = np.zeros(self.codes.size, dtype=np.bool_)
-        picked[route[near & (half > LEAST * self.radius)]] = True
-        return picked
-
-    def _through(self, route: IntArray) -> FloatArray:
-        """Centres of the faces that a way passes, shape (k - 1, 3); [m]."""
         centre, half = self.boxes(self.codes[route], self.levels[route])
         low = np.maximum((centre - half[:, None])[:-1], (centre - half[:, None])[1:])
         high = np.minimum((centre + half[:, None])[:-1], (centre + half[:, None])[1:])
-        return np.asarray((low + high) / 2.0)
+        aside = self.known[0][route] < 0.0
+        aside[[0, -1]] = False
+        faces = np.flatnonzero(~aside[:-1] & ~aside[1:])
+        order = np.concatenate([faces + 0.5, np.flatnonzero(aside)])
+        points = [(low + high)[faces] / 2.0, self.known[2][route[aside]]]
+        by = np.argsort(order)
+        return order[by], np.concatenate(points)[by]
+
+    def _blocked(
+        self, route: IntArray, order: FloatArray, points: FloatArray
+    ) -> BoolArray:
+        """Cells to halve, as a way is blocked in them or between them.
+
+        Args:
+            route: Cells of the way, shape (k,).
+            order: Where the inner points are, see `_through`, shape (m,).
+            points: Of the way, both ends included, shape (m + 2, 3); [m].
+        """
+        near = self.room.near.spare(points[:-1], points[1:]) < 0.0
+        first = np.ceil(np.append(0.0, order)).astype(np.int64)
+        last = np.floor(np.append(order, len(route) - 1.0)).astype(np.int64)
+        number = np.arange(len(route))
+        within = (first[near, None] <= number) & (number <= last[near, None])
+        half = self.side / 2.0 ** (self.levels[route] + 1.0)
+        picked = np.zeros(self.codes.size, dtype=np.bool_)
+        picked[route[within.any(axis=0) & (half > LEAST * self.radius)]] = True
+        return picked
 
     @staticmethod
     def _traced(

@@ -211,7 +211,7 @@ class Octree:
         levels[kids] += 1
         shift = 3 * (DEPTH - levels[kids])
         codes[kids] += np.tile(np.arange(8), len(chosen)) << shift
-        known = tuple(np.repeat(values, count) for values in self.known)
+        known = tuple(np.repeat(values, count, axis=0) for values in self.known)
         for values, fresh in zip(
             known, self.look(codes[kids], levels[kids]), strict=True
         ):
