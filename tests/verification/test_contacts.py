@@ -30,7 +30,7 @@ def placed(piece: Piece, x: float, turn: FloatArray) -> Placed:
     return Placed([piece], pose)
 
 
-@pytest.mark.parametrize("depth", [1e-4, 1e-3, 0.05])
+@pytest.mark.parametrize("depth", [1e-6, 1e-5, 1e-4, 1e-3, 0.05])
 @pytest.mark.parametrize("other", PIECES)
 @pytest.mark.parametrize("one", PIECES)
 def test_ball_where_bodies_meet_by_a_known_depth(

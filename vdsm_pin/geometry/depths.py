@@ -1,7 +1,7 @@
 """How deep points lie in convex pieces, and the deepest point of two, compiled.
 
-Depths are concave, so that shortening steps up their slopes lead near the top. Nothing
-here has to be exact: whoever asks proves what is found.
+Depths are concave, so that shortening steps up their slopes lead near the top, and cuts
+by them to it. Nothing here has to be exact: whoever asks proves what is found.
 """
 
 from math import exp, sqrt
@@ -25,6 +25,12 @@ SHORTER: Final = 0.97
 
 LONGEST: Final = 1e-3
 """The first step, where depths do not ask for a longer one; [m]."""
+
+CUTS: Final = 500
+"""Of an ellipsoid, which each shrinks by a twenty-fifth of its size at least."""
+
+FINEST: Final = 1e-10
+"""How much deeper a point may lie that is not looked for; [m]."""
 
 FIRST_RATE: Final = 10.0
 """Of the weights of corners; [-]."""
@@ -107,10 +113,11 @@ def _depth(inside: Inside, x: FloatArray, way: FloatArray) -> float:
 def climb(
     one: Inside, other: Inside, start: FloatArray, enough: float, where: FloatArray
 ) -> float:
-    """The deepest point in two pieces that steps along slopes find.
+    """The deepest point in two pieces, as far as cuts by their slopes find it.
 
-    Steps up the slope of the lesser depth lead near its top, and steps up both slopes
-    at once along the ridge on which both are equal.
+    Steps up the slope of the lesser depth lead near it, and the ellipsoid method from
+    there to it, however flat the room in both is (Shor 1977; deep cuts as in Bland,
+    Goldfarb and Todd 1981).
 
     Args:
         one: A piece.
@@ -123,39 +130,77 @@ def climb(
         How deep it seems to lie in both; [m].
     """
     one, other = borrowed(one), borrowed(other)
-    at, up, ways = np.zeros(3), np.zeros(3), np.zeros((2, 3))
+    at, up = start.copy(), np.zeros(3)
     where[:] = start
-    best, depths = -np.inf, np.zeros(2)
-    depths[0], depths[1] = _depth(one, start, ways[0]), _depth(other, start, ways[1])
-    longest = max(LONGEST, abs(depths[0]), abs(depths[1]))
-    if not longest < np.inf:
-        return best
-    for along_ridge in (False, True):
-        at[:], step = where, longest
-        for _ in range(STEPS):
-            depths[0], depths[1] = _depth(one, at, ways[0]), _depth(other, at, ways[1])
-            lesser = 0 if depths[0] <= depths[1] else 1
-            up[:] = ways[lesser]
-            if depths[lesser] > best:
-                best = depths[lesser]
-                where[:] = at
-                if best > enough:
-                    return float(best)
-            elif along_ridge:
-                at[:] = where
-                depths[0] = _depth(one, at, ways[0])
-                depths[1] = _depth(other, at, ways[1])
-            squared = 0.0
-            for c in range(3):
-                squared += (ways[0, c] + ways[1, c]) ** 2
-            level = abs(depths[0] - depths[1]) <= step
-            if along_ridge and level and squared > 0.0:
-                for c in range(3):
-                    up[c] = (ways[0, c] + ways[1, c]) / sqrt(squared)
-            for c in range(3):
-                at[c] += step * up[c]
-            step *= SHORTER
-    return float(best)
+    best = _depth_in_both(one, other, at, up)
+    step = max(LONGEST, abs(best))
+    if not step < np.inf:
+        return -np.inf
+    reach = step / (1.0 - SHORTER)
+    for _ in range(STEPS):
+        if best > enough:
+            return best
+        for c in range(3):
+            at[c] += step * up[c]
+        step *= SHORTER
+        depth = _depth_in_both(one, other, at, up)
+        if depth > best:
+            best = depth
+            where[:] = at
+    return _refined(one, other, reach, enough, where)
+
+
+@compiled
+def _depth_in_both(one: Inside, other: Inside, x: FloatArray, way: FloatArray) -> float:
+    """The lesser depth of a point, and the way to have more of it, (3,)."""
+    second = np.zeros(3)
+    first_depth, second_depth = _depth(one, x, way), _depth(other, x, second)
+    if first_depth <= second_depth:
+        return first_depth
+    way[:] = second
+    return second_depth
+
+
+@compiled
+def _refined(
+    one: Inside, other: Inside, reach: float, enough: float, where: FloatArray
+) -> float:
+    """The depth of the deepest point within reach of one, which it takes the place of.
+
+    What is deeper than the best point lies in an ellipsoid, of which every slope cuts
+    off a part.
+    """
+    one, other = borrowed(one), borrowed(other)
+    centre, up, towards = where.copy(), np.zeros(3), np.zeros(3)
+    shape, best = reach * reach * np.eye(3), -np.inf
+    for _ in range(CUTS):
+        depth = _depth_in_both(one, other, centre, up)
+        if depth > best:
+            best = depth
+            where[:] = centre
+        squared = 0.0
+        for c in range(3):
+            towards[c] = 0.0
+            for d in range(3):
+                towards[c] += shape[c, d] * up[d]
+            squared += up[c] * towards[c]
+        # No point of the ellipsoid is deeper by more than this.
+        more = sqrt(max(squared, 0.0))
+        if best > enough or not more > best - depth + FINEST:
+            break
+        off = (best - depth) / more
+        grown, thinner = (
+            1.125 * (1.0 - off * off),
+            0.5 * (1.0 + 3.0 * off) / (1.0 + off),
+        )
+        for c in range(3):
+            towards[c] /= more
+            centre[c] += 0.25 * (1.0 + 3.0 * off) * towards[c]
+        for c in range(3):
+            for d in range(3):
+                cut = thinner * towards[c] * towards[d]
+                shape[c, d] = grown * (shape[c, d] - cut)
+    return best
 
 
 @compiled
