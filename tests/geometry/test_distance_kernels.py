@@ -22,6 +22,7 @@ from vdsm_pin.geometry.kernels import (
 from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.solids import BOX_CORNERS
 
 GOAL = 1e-9
 
@@ -167,6 +168,27 @@ def test_meeting_bodies_have_no_positive_bound() -> None:
         out = measure(pack_pieces([[hull]]), 0, ends)
         assert out[LOWER] <= out[UPPER] <= 0.0 + 1e-12
         assert np.isfinite(out[LOWER])
+
+
+@pytest.mark.parametrize("gap", [1e-6, 1e-5, 1e-4])
+def test_what_stands_nearly_flat_on_a_plate_is_measured_to_the_goal(gap: float) -> None:
+    """A foot of many corners above a plate that is far larger: the lowest is nearest.
+
+    Slender triangles of its difference pass so near to the origin that a point in
+    them, told to a rounding, does not tell where the origin is seen from.
+    """
+    rng = np.random.default_rng(11)
+    for _ in range(60):
+        turn, plate = random_rotation(rng), np.array([0.6, 0.5, 0.02])
+        angles = np.linspace(0.0, 2.0 * np.pi, int(rng.integers(20, 90)))[:-1]
+        ring = 0.05 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        tilt = 10.0 ** rng.uniform(-6, -2) * rng.normal(size=2)
+        foot = np.column_stack([ring, ring @ tilt])
+        foot = np.concatenate([foot, foot * [0.8, 0.8, 1.0] + [0.0, 0.0, 0.1]])
+        foot[:, :2] += rng.uniform(-0.4, 0.4, 2)
+        foot[:, 2] += plate[2] + gap - foot[:, 2].min()
+        piece = Hull((BOX_CORNERS * plate) @ turn.T)
+        assert_brackets(measure(pack_pieces([[piece]]), 0, foot @ turn.T), gap)
 
 
 def test_half_space_is_exact() -> None:

@@ -170,6 +170,33 @@ def _known(scratch: FloatArray, m: int) -> bool:
 
 
 @compiled
+def _direction(
+    scratch: FloatArray, m: int, distance: float
+) -> tuple[float, float, float]:
+    """The unit vector from the origin to the nearest point of a simplex.
+
+    Near a large triangle the plane has it far better than a point in it has.
+    """
+    apart()
+    if m == 3:
+        a, b, c = scratch[0], scratch[1], scratch[2]
+        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        length = sqrt(nx * nx + ny * ny + nz * nz)
+        if nx * a[0] + ny * a[1] + nz * a[2] < 0.0:
+            length = -length
+        if length != 0.0:
+            return nx / length, ny / length, nz / length
+    near, far = scratch[12], scratch[13]
+    return (
+        (far[0] - near[0]) / distance,
+        (far[1] - near[1]) / distance,
+        (far[2] - near[2]) / distance,
+    )
+
+
+@compiled
 def _iterate(
     pieces: PackedPieces,
     p: int,
@@ -202,9 +229,7 @@ def _iterate(
         distance = _witness(scratch, m, weights, out)
         if m == 4 or not distance < before or distance == 0.0:
             break
-        nx = (scratch[13, 0] - scratch[12, 0]) / distance
-        ny = (scratch[13, 1] - scratch[12, 1]) / distance
-        nz = (scratch[13, 2] - scratch[12, 2]) / distance
+        nx, ny, nz = _direction(scratch, m, distance)
 
 
 @compiled
