@@ -251,7 +251,7 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
     least = LeastClearances(
         numbers, shares, lower, upper, verdicts_of(counts), points[0], points[1]
     )
-    radii = {k: rng.choice([0.0, 0.25], len(BESIDE)) for k in range(n)}
+    radii = {k: rng.choice([0.0, 0.25], len(BESIDE) + 1) for k in range(n)}
     left = {k: iter(radii[k].tolist()) for k in range(n)}
     asked = list[tuple[int, float]]()
 
@@ -264,8 +264,9 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
     path: Any = SimpleNamespace(
         n_intervals=n_rows - 1,
         split=proof.motion.path.split,
-        within=lambda k, share: k + share,
+        at_moments=lambda moments: moments,
     )
+    monkeypatch.setattr(clearances, "seeming_depth", lambda *_: -1.0)
     asking = replace(proof.motion, asked=held, path=path)
     given = replace(proof, motion=asking, inner=least, counts=counts)
     found = given.with_meetings()
@@ -280,7 +281,7 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
         if met > MOST_MEETINGS:
             continue
         middle = points[:, k].mean(axis=0)
-        for off, radius in zip(BESIDE, radii[k], strict=True):
+        for off, radius in zip([*BESIDE, 0.0], radii[k], strict=True):
             moment = min(max(numbers[k] + shares[k] + off, 0.0), n_rows - 1.0)
             expected.append((k, moment))
             if radius > max(0.0, -upper[k]):

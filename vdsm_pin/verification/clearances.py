@@ -1,5 +1,6 @@
 """The least clearance of every pair, and a ball in both bodies where they meet."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,15 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
-from vdsm_pin.verification.contacts import BESIDE, MEETING, common_ball
+from vdsm_pin.verification.contacts import (
+    BESIDE,
+    HALVINGS,
+    MEETING,
+    NEXT,
+    Placed,
+    common_ball,
+    seeming_depth,
+)
 from vdsm_pin.verification.moving import Knots
 
 
@@ -67,23 +76,49 @@ def with_balls(
         span: As for `with_depths`.
         deadline: When to leave it at what was found.
     """
-    asked, path = motion.asked, motion.path
     span = motion.span if span is None else span
     changed = dict[int, tuple[Any, ...]]()
-    beside = min(1.0, span[1] - span[0]) * BESIDE
     for k in pairs.tolist():
         if deadline.passed:
             break
         moment = least.interval[k] + least.share[k]
         middle = 0.5 * (least.link_point[k] + least.other_point[k])
-        intervals, shares = path.split(np.clip(moment + beside, *span))
-        for at, pose in enumerate(asked.poses(path.within(intervals, shares))):
-            radius, centre = common_ball(*asked.placed(k, pose), middle, enough)
+        for at in _moments(motion, k, moment, middle, span):
+            radius, centre = common_ball(*_placed(motion, k, at), middle, enough)
             if radius > max(0.0, -float(least.upper[k])):
-                when = intervals[at], shares[at], least.lower[k]
-                changed[k] = *when, -radius, REFUTED, centre, centre
+                (interval,), (share,) = motion.path.split(np.array([at]))
+                bounds = least.lower[k], -radius
+                changed[k] = interval, share, *bounds, REFUTED, centre, centre
                 break
     return least.with_rows(changed)
+
+
+def _placed(motion: AskedMotion, k: int, moment: float) -> tuple[Placed, Placed]:
+    """Both bodies of a pair at a moment in knots."""
+    (pose,) = motion.asked.poses(motion.path.at_moments(np.array([moment])))
+    return motion.asked.placed(k, pose)
+
+
+def _moments(
+    motion: AskedMotion, k: int, moment: float, middle: FloatArray, span: FloatArray
+) -> Iterator[float]:
+    """When a pair may meet: at a moment, beside it, where it seems deepest near it.
+
+    Bodies that graze meet for less time than there is to the moments beside.
+    """
+    length = min(1.0, float(span[1] - span[0]))
+    yield from np.clip(moment + length * BESIDE, *span).tolist()
+
+    def depth(at: float) -> float:
+        return seeming_depth(*_placed(motion, k, at), middle)
+
+    most, step = depth(moment), length * NEXT
+    for _ in range(HALVINGS if length else 0):
+        step *= 0.5
+        for at in np.clip([moment - step, moment + step], *span).tolist():
+            if (found := depth(at)) > most:
+                most, moment = found, at
+    yield moment
 
 
 def in_rows(least: LeastClearances, knots: Knots) -> LeastClearances:

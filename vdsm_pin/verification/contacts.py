@@ -46,8 +46,14 @@ KEPT: Final = 128
 MEETING: Final = 2.0 * TOLERANCES.bracket_gap
 """Bodies that come so near may meet; [m]."""
 
-BESIDE: Final = np.array([0.0, 0.01, -0.01, 0.05, -0.05])
+NEXT: Final = 0.01
+"""From the moment at which bodies meet to the next one that is looked at; [-]."""
+
+BESIDE: Final = NEXT * np.array([0.0, 1.0, -1.0, 5.0, -5.0])
 """Where a ball in both is looked for, beside the moment at which bodies meet; [-]."""
+
+HALVINGS: Final = 12
+"""Of steps to deeper moments where bodies meet for a shorter while; [-]."""
 
 
 class Placed(NamedTuple):
@@ -92,6 +98,21 @@ def common_ball(
             if radius > 0.0 and _hold(thick, centre + share * depth * CORNERS, lost):
                 return radius, centre
     return 0.0, point
+
+
+def seeming_depth(one: Placed, other: Placed, point: FloatArray) -> float:
+    """How deep a point seems to lie in a piece of each body at most; [m].
+
+    It is below 0 where they seem apart, -inf where not even their boxes meet. Arguments
+    are those of `common_ball`.
+    """
+    deepest = -np.inf
+    if np.isfinite(point).all():
+        for mine, theirs in product(_near(one, point), _near(other, point)):
+            thick = mine.inside is not None or theirs.inside is not None
+            if thick and _may_meet(mine.piece, theirs.piece):
+                deepest = max(deepest, _deepest(mine, theirs, point, np.inf)[0])
+    return deepest
 
 
 class _Near:
