@@ -11,7 +11,7 @@ import pytest
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.geometry.arrays import rotation_from_rpy
-from vdsm_pin.geometry.solids import Cylinder, HalfSpace, Sphere
+from vdsm_pin.geometry.solids import Box, Cylinder, HalfSpace, Sphere
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
@@ -25,6 +25,7 @@ from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.time_limit import Deadline
+from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two">
@@ -103,6 +104,26 @@ def test_the_least_clearance_is_the_closed_form(tmp_path: Path, robot: Robot) ->
     np.testing.assert_allclose(
         np.linalg.norm(near.link_point - near.other_point), near.upper, atol=1e-6
     )
+
+
+@pytest.mark.parametrize("depth", [-2e-6, 2e-6, 5e-6, 2e-5])
+@pytest.mark.parametrize("ends", [(-1.1, 1.3), (-3.0, 0.7), (-0.2, 2.9)])
+def test_what_grazes_for_a_moment_is_decided(
+    tmp_path: Path, ends: tuple[float, float], depth: float
+) -> None:
+    """The edges of a bar that turns reach as far as they are long, for a moment."""
+    text = """<robot name="bar"><link name="base"/><link name="bar"><collision>
+      <origin xyz="0.3 0 0"/><geometry><box size="0.4 0.04 0.04"/></geometry>
+      </collision></link><joint name="turn" type="continuous"><parent link="base"/>
+      <child link="bar"/><axis xyz="0 0 1"/></joint></robot>"""
+    half, reach = np.array([0.1, 0.9, 0.7]), float(np.hypot(0.5, 0.02))
+    centre = np.array([reach - depth + half[0], 0.1, 0.05])
+    wall = Box("wall", centre, np.eye(3), half)
+    bar = read_robot(RobotFiles(write(tmp_path, "bar.urdf", text)))
+    found = verify_robot(Cell(bar, Scene((wall,))), Motion(np.array(ends)[:, None]))
+    (row,) = (one for one in found.checks if one.name == OBSTACLES)
+    assert row.verdict is (Verdict.REFUTED if depth > 0.0 else Verdict.CERTIFIED)
+    assert -depth / 2.0 <= row.worst < 0.0 if depth > 0.0 else row.worst <= -depth
 
 
 def test_what_is_not_judged_in_time_is_undecided(tmp_path: Path, robot: Robot) -> None:

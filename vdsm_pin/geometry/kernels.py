@@ -214,7 +214,8 @@ def _iterate(
     for _ in range(MAX_STEPS):
         high = body_support(body, nx, ny, nz, scratch[4 + m])
         gap = piece_support(pieces, p, nx, ny, nz, scratch[8 + m]) - high
-        if gap > out[LOWER]:
+        raised = gap > out[LOWER]
+        if raised:
             out[LOWER] = gap
             out[NORMAL], out[NORMAL + 1], out[NORMAL + 2] = nx, ny, nz
         if out[UPPER] - out[LOWER] <= goal:
@@ -227,7 +228,8 @@ def _iterate(
         m = _compact(scratch, m + 1, weights)
         before = out[UPPER]
         distance = _witness(scratch, m, weights, out)
-        if m == 4 or not distance < before or distance == 0.0:
+        # A direction may turn far while the distance stays within its rounding.
+        if m == 4 or distance == 0.0 or not (distance < before or raised):
             break
         nx, ny, nz = _direction(scratch, m, distance)
 
