@@ -78,7 +78,8 @@ def verify_robot(
     knots, named = motion.knots, cell.asked.pairs
     proof = motion.proof(budget)
     located = locate_links(cell, motion, budget)
-    proved = with_depths(motion, least_clearances(cell.asked, proof))
+    least = least_clearances(cell.asked, proof)
+    proved = with_depths(motion, least, deadline=deadline)
     coal, measured = _coal(cell, motion, proof)
     least = enclosed_least(proved, pairs_inside(located))
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))

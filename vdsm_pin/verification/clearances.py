@@ -45,6 +45,7 @@ def with_depths(
     least: LeastClearances,
     enough: float = np.inf,
     span: FloatArray | None = None,
+    deadline: Deadline = NO_LIMIT,
 ) -> LeastClearances:
     """The same, with the depths that balls in both bodies prove.
 
@@ -53,9 +54,10 @@ def with_depths(
         least: What is proved of it, or of a part.
         enough: No ball deeper than this is looked for; [m].
         span: From when to when that is, in knots of the path; None for all of it.
+        deadline: When to leave it at what was found.
     """
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
-    return with_balls(motion, least, np.flatnonzero(near), enough, span)
+    return with_balls(motion, least, np.flatnonzero(near), enough, span, deadline)
 
 
 def with_balls(
@@ -79,11 +81,11 @@ def with_balls(
     span = motion.span if span is None else span
     changed = dict[int, tuple[Any, ...]]()
     for k in pairs.tolist():
-        if deadline.passed:
-            break
         moment = least.interval[k] + least.share[k]
         middle = 0.5 * (least.link_point[k] + least.other_point[k])
-        for at in _moments(motion, k, moment, middle, span):
+        for at in _moments(motion, k, moment, middle, span, deadline):
+            if deadline.passed:
+                return least.with_rows(changed)
             radius, centre = common_ball(*_placed(motion, k, at), middle, enough)
             if radius > max(0.0, -float(least.upper[k])):
                 (interval,), (share,) = motion.path.split(np.array([at]))
@@ -100,7 +102,12 @@ def _placed(motion: AskedMotion, k: int, moment: float) -> tuple[Placed, Placed]
 
 
 def _moments(
-    motion: AskedMotion, k: int, moment: float, middle: FloatArray, span: FloatArray
+    motion: AskedMotion,
+    k: int,
+    moment: float,
+    middle: FloatArray,
+    span: FloatArray,
+    deadline: Deadline,
 ) -> Iterator[float]:
     """When a pair may meet: at a moment, beside it, where it seems deepest near it.
 
@@ -116,6 +123,8 @@ def _moments(
     for _ in range(HALVINGS if length else 0):
         step *= 0.5
         for at in np.clip([moment - step, moment + step], *span).tolist():
+            if deadline.passed:
+                return
             if (found := depth(at)) > most:
                 most, moment = found, at
     yield moment

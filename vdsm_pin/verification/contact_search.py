@@ -79,7 +79,9 @@ class _Judge:
         span = motion.knots.inner(np.array([low, high]))
         results, _ = self._stretches.over(*span.tolist())
         least = least_clearances(motion.asked, motion.told(results))
-        return with_depths(motion, least, ENOUGH, span) if self._balls else least
+        if not self._balls:
+            return least
+        return with_depths(motion, least, ENOUGH, span, self._deadline)
 
     def noted(self) -> Noted | None:
         """The intervals in which some pair is too close; None where too many."""

@@ -9,7 +9,6 @@ the other body.
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
-from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -86,12 +85,8 @@ def common_ball(
     if not np.isfinite(point).all():
         return 0.0, point
     lost = TOLERANCES.bracket_gap + TOLERANCES.arithmetic
-    for mine, theirs in product(_near(one, point), _near(other, point)):
-        if not _may_meet(mine.piece, theirs.piece):
-            continue
+    for mine, theirs in _meeting(one, other, point):
         thick = [near.piece for near in (mine, theirs) if near.inside is not None]
-        if not thick:
-            continue
         depth, centre = _deepest(mine, theirs, point, enough)
         for share in SHARES:
             radius = share * depth / 3.0 - lost
@@ -106,13 +101,11 @@ def seeming_depth(one: Placed, other: Placed, point: FloatArray) -> float:
     It is below 0 where they seem apart, -inf where not even their boxes meet. Arguments
     are those of `common_ball`.
     """
-    deepest = -np.inf
-    if np.isfinite(point).all():
-        for mine, theirs in product(_near(one, point), _near(other, point)):
-            thick = mine.inside is not None or theirs.inside is not None
-            if thick and _may_meet(mine.piece, theirs.piece):
-                deepest = max(deepest, _deepest(mine, theirs, point, np.inf)[0])
-    return deepest
+    if not np.isfinite(point).all():
+        return -np.inf
+    pairs = _meeting(one, other, point)
+    depths = (_deepest(*pair, point, np.inf)[0] for pair in pairs)
+    return max(depths, default=-np.inf)
 
 
 class _Near:
@@ -163,6 +156,21 @@ def _near(body: Placed, point: FloatArray) -> list[_Near]:
     return [_Near(piece, body.pose) for piece in nearest_pieces(body.pieces, seen)]
 
 
+def _meeting(
+    one: Placed, other: Placed, point: FloatArray
+) -> Iterator[tuple[_Near, _Near]]:
+    """Pieces near a point whose boxes meet, of which one at least has an inside."""
+    mine, theirs = _near(one, point), _near(other, point)
+    (low, high), (least, most) = (
+        np.swapaxes([_box(near.piece) for near in some], 0, 1)
+        for some in (mine, theirs)
+    )
+    meet = (low[:, None] <= most) & (least <= high[:, None])
+    for j, k in np.argwhere(meet.all(axis=2)).tolist():
+        if mine[j].inside is not None or theirs[k].inside is not None:
+            yield mine[j], theirs[k]
+
+
 def _deepest(
     one: _Near, other: _Near, point: FloatArray, enough: float
 ) -> tuple[float, FloatArray]:
@@ -200,12 +208,6 @@ def _box(piece: Piece) -> tuple[FloatArray, FloatArray]:
         return low - piece.radius, high + piece.radius
     reach = piece.half_length + piece.radius
     return piece.centre - reach, piece.centre + reach
-
-
-def _may_meet(one: Piece, other: Piece) -> bool:
-    """Whether the boxes of two pieces meet."""
-    (low, high), (least, most) = _box(one), _box(other)
-    return bool((low <= most).all() and (least <= high).all())
 
 
 def _hold(pieces: Sequence[Piece], corners: FloatArray, lost: float) -> bool:
