@@ -171,7 +171,7 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
 # ---- the same, as the product is called ----------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Body(ConvexCover):
     """An obstacle of stated pieces, half-spaces among them."""
 

@@ -18,6 +18,8 @@ from vdsm_pin import api
 from vdsm_pin.arm.cable_layout import paper_hole_angles
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.geometry.convex import FlatCylinder, Hull
+from vdsm_pin.geometry.file_solids import ConvexCover
 from vdsm_pin.problem.error_boxes import ErrorBox as Box
 from vdsm_pin.problem.error_boxes import ObstacleError
 
@@ -172,6 +174,9 @@ def test_arguments_of_another_kind_are_refused_in_a_sentence() -> None:
             call()
 
 
+TUBE = FlatCylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.2, 0.1)
+
+
 def test_values_made_twice_are_equal_and_found_in_lists() -> None:
     """Arrays are compared by their values, never as a truth of many."""
     for name in ("paper/obs1", "paper/obs2"):
@@ -191,6 +196,8 @@ def test_values_made_twice_are_equal_and_found_in_lists() -> None:
     assert (
         row == vp.JointTrajectory(("a",), [[1.0]]) != vp.JointTrajectory(("b",), [[1]])
     )
+    covers = [ConvexCover("c", (Hull(np.eye(3)), TUBE)) for _ in range(2)]
+    assert covers[0] == covers[1] != ConvexCover("c", (Hull(np.eye(3), 0.1), TUBE))
     mesh = vp.Mesh("m", np.eye(3), [[0, 1, 2]])
     assert mesh == vp.Mesh("m", np.eye(3), [[0, 1, 2]]) != vp.Sphere("m", [0, 0, 0], 1)
 

@@ -1,23 +1,17 @@
 """The problem file that the certificate of a robot given by options is about."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from vdsm_pin.io.atomic import atomic_path
-from vdsm_pin.report.folder import check_kept, check_output_file
-
-if TYPE_CHECKING:  # an arm's certificate needs nothing of robots
-    from vdsm_pin.robots.cell import Cell
-    from vdsm_pin.robots.files import RobotFiles
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
+from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.robots.cell import Cell
+from vdsm_pin.report.folder import check_kept, check_output_file, problem_beside
+from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.units import MM_PER_M
 
@@ -89,18 +83,9 @@ def _deg(angle: float) -> float:
     return float(np.rad2deg(angle))
 
 
-def problem_beside(certificate: Path) -> Path:
-    """Where it stands."""
-    return certificate.parent / f"{certificate.name}.yaml"
-
-
 def stated_cell(
-    cell: "Cell",
-    files: "RobotFiles",
-    scene: Path | None,
-    certificate: Path,
-    motion: Path,
-) -> "Cell":
+    cell: Cell, files: RobotFiles, scene: Path | None, certificate: Path, motion: Path
+) -> Cell:
     """The same cell, read from a problem file that is written for it.
 
     Args:
@@ -113,8 +98,6 @@ def stated_cell(
     Raises:
         InvalidInput: If the file cannot be written, or is one that is read.
     """
-    from vdsm_pin.robots.cell import read_cell
-
     path = problem_beside(certificate)
     for output in (certificate, path):
         check_output_file(output)

@@ -171,7 +171,7 @@ def _passes(order: "VerifyOrder", answer: Answer) -> bool:
         verified = verify_to_folder(order)
     written: list[tuple[str, str]] = []
     if order.certificate is not None:
-        from vdsm_pin.app.stated_problem import problem_beside
+        from vdsm_pin.report.folder import problem_beside
 
         none = verified.no_certificate
         what = f"none: {none}" if none else str(order.certificate)

@@ -10,11 +10,11 @@ from typing import TypeAlias, overload
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import ByValue, FloatArray, frozen
 
 
-@dataclass(frozen=True)
-class FewCorners:
+@dataclass(frozen=True, eq=False)
+class FewCorners(ByValue):
     """Some corners of a hull that nearly span it.
 
     Args:
@@ -26,8 +26,8 @@ class FewCorners:
     missed: float
 
 
-@dataclass(frozen=True)
-class Hull:
+@dataclass(frozen=True, eq=False)
+class Hull(ByValue):
     """Convex hull of points, grown by a radius.
 
     Args:
@@ -41,8 +41,8 @@ class Hull:
     few: tuple[FewCorners, ...] = ()
 
 
-@dataclass(frozen=True)
-class FlatCylinder:
+@dataclass(frozen=True, eq=False)
+class FlatCylinder(ByValue):
     """Solid cylinder with flat ends.
 
     Args:
@@ -75,8 +75,8 @@ def placed_piece(piece: Hull | FlatCylinder, pose: FloatArray) -> Hull | FlatCyl
     return replace(piece, centre=centre, axis=axis)
 
 
-@dataclass(frozen=True)
-class HalfSpacePiece:
+@dataclass(frozen=True, eq=False)
+class HalfSpacePiece(ByValue):
     """Points p with normal . p <= offset.
 
     Args:

@@ -16,6 +16,11 @@ UNFINISHED: Final = ".vdsm-unfinished-"
 """What the names of temporary folders begin with."""
 
 
+def problem_beside(certificate: Path) -> Path:
+    """Where the problem file stands that a certificate is about, of a robot alone."""
+    return certificate.parent / f"{certificate.name}.yaml"
+
+
 def check_output_folder(folder: Path) -> None:
     """Refuse an output folder that cannot take files, before any work is done.
 

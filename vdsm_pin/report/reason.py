@@ -65,7 +65,7 @@ def reason(verification: Verification) -> str:
     inside = first.name in (ARM_OUTSIDE, LINKS_OUTSIDE)
     if inside:
         found = first.where
-    elif math.isnan(first.worst):
+    elif not math.isfinite(first.worst):
         found = f'there is no evidence for "{first.name}"'
     elif not math.isnan(first.limit):
         found += f" against a limit of {asked}"

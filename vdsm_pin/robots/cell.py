@@ -78,7 +78,8 @@ class Cell(AnyProblem):
         required_self_clearance: Least clearance between links that are held apart; [m].
         name: Of the problem; empty for the robot's.
         T_world_base: The robot's root link in the frame of the files, (4, 4); [m].
-        errors: What every clearance is asked for under.
+        errors: What every clearance is asked for under; those of the base are of the
+            fixed joint that carries the root link, so that bodies on it are moved too.
         source: The files it was read from; None where it was changed since by more than
             its errors.
 
@@ -103,7 +104,7 @@ class Cell(AnyProblem):
         self.check_errors(self.errors)
 
     def check_errors(self, errors: ErrorBox) -> None:
-        """Refuse errors of what there is not: see `robots.errors.check_errors`."""
+        """Refuse errors of what there is not: see `check_errors`."""
         check_errors(self.robot, self.scene, errors)
 
     @property

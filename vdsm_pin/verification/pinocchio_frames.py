@@ -72,10 +72,10 @@ class PinocchioFrames:
         import pinocchio as pin
 
         if self._seen.parts is not parts:
-            data = self._seen.data = self.model.createData()
+            data = self.model.createData()
             frames = (data.oMf[number] for number in self.numbers)
-            self._seen.live = [part for frame in frames for part in parts(frame)]
-            self._seen.parts = parts
+            seen = [part for frame in frames for part in parts(frame)]
+            self._seen.data, self._seen.live, self._seen.parts = data, seen, parts
         data, live = self._seen.data, self._seen.live
         found = np.zeros((len(q), sum(part.size for part in live)))
         for row, values in zip(found, q, strict=True):
