@@ -16,7 +16,8 @@ class Budget:
         candidates: Most blocks, and then intervals, kept for narrowing the least
             bracket.
         profile: Most values of a profile; beyond it intervals share a bin.
-        slack: How wide a bracket may be, as a part of the clearance; [-].
+        slack: Brackets wider than this part of the clearance are asked of a new plane;
+            [-].
         until: When to stop, by the monotonic clock; [s].
     """
 

@@ -43,7 +43,7 @@ from vdsm_pin.verification.records import Check, Verdict, Verification
 
 NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
 WIDTH: Final = 0.1
-"""How wide brackets may be but for the least one, as a part of the clearance; [-]."""
+"""Brackets wider than this part of the clearance are asked of a new plane; [-]."""
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)

@@ -2,13 +2,14 @@
 
 The clearance of two hulls that meet is known to be 0 at most, which refutes no required
 clearance of 0. A climb finds a point that is deep in both; the corners of a small
-tetrahedron around it are proved to lie in a piece of each, so its ball does too. Of a
+icosahedron around it are proved to lie in a piece of each, so its ball does too. Of a
 piece without an inside, as a triangle is, the ball is about a point of it and lies in
 the other body.
 """
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
+from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -29,8 +30,17 @@ from vdsm_pin.proof.tree import IDENTITY
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.coal_hulls import hull_planes
 
-CORNERS: Final = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 3**0.5
-"""Of a tetrahedron about the origin whose inner ball has a third of their distance."""
+GOLDEN: Final = (1.0 + 5.0**0.5) / 2.0
+CORNERS: Final = np.array(
+    [
+        np.roll([0.0, i, j * GOLDEN], k) / (1.0 + GOLDEN**2) ** 0.5
+        for i, j, k in product((-1, 1), (-1, 1), range(3))
+    ]
+)
+"""Of an icosahedron about the origin, shape (12, 3): unit vectors."""
+
+INNER: Final = 0.7946
+"""Radius of a ball that it holds: its own inner one is sqrt((5 + 2 sqrt(5)) / 15)."""
 
 SHARES: Final = (0.9, 0.5, 0.1)
 """Sizes that are tried, as parts of the depth that was climbed to; [-]."""
@@ -89,7 +99,7 @@ def common_ball(
         thick = [near.piece for near in (mine, theirs) if near.inside is not None]
         depth, centre = _deepest(mine, theirs, point, enough)
         for share in SHARES:
-            radius = share * depth / 3.0 - lost
+            radius = INNER * share * depth - lost
             if radius > 0.0 and _hold(thick, centre + share * depth * CORNERS, lost):
                 return radius, centre
     return 0.0, point
