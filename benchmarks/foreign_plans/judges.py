@@ -25,7 +25,7 @@ from vdsm_pin.verification.records import Verdict, combine
 DENSITIES: Final = ("0.01", "0.005", "1 deg", "1 mm")
 """Of samples: parts of the space's extent, the fastest joint, the fastest frame."""
 
-DENSE: Final = 2000
+DENSE: Final = 100_000
 """Samples that look for what is wrong in a certified plan."""
 
 RUNS: Final = 3
@@ -167,7 +167,7 @@ def _fault(
         return f"refuted, and Coal finds {1e3 * near:.4f} mm at the witness"
     if verdict is not Verdict.CERTIFIED:
         return ""
-    dense = DENSE / max(len(plan) - 1, 1)
-    if hit or any(sampled.collides(q) for q in _samples(plan, lambda a, b: dense)):
+    dense = -(-DENSE // max(len(plan) - 1, 1))
+    if hit or any(sampled.meets(a, b, dense) for a, b in pairwise(plan)):
         return "certified, and a sample collides"
     return ""

@@ -3,6 +3,7 @@
 Nothing here calls the proof, its readers or its geometry.
 """
 
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.foreign_plans.problems import load, source
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 
 SHAPES: Final = {
@@ -75,6 +77,39 @@ class Sampled:
         """The least signed distance of all pairs at q; [m]."""
         pin.computeDistances(self.model, self.data, self.geometry, self.found, q)
         return min(one.min_distance for one in self.found.distanceResults)
+
+    def meets(self, a: FloatArray, b: FloatArray, steps: int) -> bool:
+        """Whether anything meets at one of the ends of even steps from a to b.
+
+        Those are passed over before which no two bodies can come together:
+        each joint carries no point further than by its angle times its lever.
+        """
+        step = self.levers @ np.abs(b - a) / steps
+        at = 0
+        while at <= steps:
+            away = self.clearance(a + at / steps * (b - a))
+            if away <= 0.0:
+                return True
+            at += max(1, int(away / step)) if step > 0.0 else steps
+        return False
+
+    @cached_property
+    def levers(self) -> FloatArray:
+        """How far a body may reach from each joint's axis, shape (n,); [m]."""
+        model, far = self.model, np.zeros(self.model.njoints)
+        for thing in self.geometry.geometryObjects:
+            thing.geometry.computeLocalAABB()
+            center = thing.placement.act(thing.geometry.aabb_center)
+            reach = np.linalg.norm(center) + thing.geometry.aabb_radius
+            far[thing.parentJoint] = max(far[thing.parentJoint], reach)
+        for joint in range(model.njoints - 1, 0, -1):
+            if not model.joints[joint].shortname().startswith("JointModelR"):
+                message = f"joint {model.names[joint]!r} turns about no axis"
+                raise InvalidInput(message)
+            shift = np.linalg.norm(model.jointPlacements[joint].translation)
+            parent = model.parents[joint]
+            far[parent] = max(far[parent], shift + far[joint])
+        return far[1:]
 
     def travel(self, a: FloatArray, b: FloatArray) -> float:
         """About how far the fastest link frame moves from a to b; [m]."""

@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from benchmarks.common import described, surroundings
-from benchmarks.foreign_plans.judges import DENSITIES, Judged
+from benchmarks.foreign_plans.judges import DENSE, DENSITIES, Judged
 from benchmarks.foreign_plans.problems import Problem
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verdict
@@ -48,7 +48,8 @@ def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
         "Pinocchio and Coal included, the least of three. Repaired: of what collides. "
         "`python -m benchmarks.foreign_plans.run`.",
         table,
-        f"Verdicts that Coal contradicts: {len(faults)}. Problems and resolutions "
+        f"Verdicts that Coal contradicts: {len(faults)} (in {DENSE:,} states of each "
+        "certified plan it looks for a contact). Problems and resolutions "
         f"without a plan: {len(unplanned)}"
         f"{_where(unplanned)}.",
         described(surroundings()).rstrip(".") + f", {_ompl()}.",

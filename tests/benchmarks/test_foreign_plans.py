@@ -126,3 +126,18 @@ def test_planned_by_ompl(folder: Path) -> None:
     assert len(found) == 2
     assert not any(one.fault for one in found)
     assert all(one.plan.waypoints[0] == [0.0, 0.0] for one in found)
+
+
+def test_states_passed_over_are_clear(folder: Path, tmp_path: Path) -> None:
+    """Of random motions the same is said as by asking about every state."""
+    (problem,) = problems("panda", 1, tmp_path / "aside")
+    sampled, rng = Sampled("panda", problem.scene), np.random.default_rng(5)
+    assert np.allclose(sampled.levers, [0.4 + 0.1 + 0.4, 0.4], rtol=0.2)
+    found = []
+    for _ in range(60):
+        a, b = rng.uniform(-0.4, 0.9, (2, 2))
+        states = a + np.linspace(0.0, 1.0, 401)[:, None] * (b - a)
+        each = any(sampled.collides(q) for q in states)
+        assert sampled.meets(a, b, 400) == each
+        found.append(each)
+    assert 10 < sum(found) < 50
