@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 from flint import arb_mat, ctx
-from oracles.closed_solids import made, sample_points
+from oracles.closed_solids import (
+    exactly,
+    made,
+    sample_points,
+    tetrahedron_at_a_ray,
+)
 
 from vdsm_pin.certificate_checker.balls import Rejected
 from vdsm_pin.certificate_checker.inside import (
@@ -249,6 +254,50 @@ def test_what_is_seen_first_decides_in_a_cavity() -> None:
     across = np.concatenate([cube(4, 1.0), cube(4, -1.0, sense=-1)])
     why = Surface(across).not_outside(point, 0.01)
     assert why == "its faces are turned both ways"
+
+
+SCALES = [2.0**-10, 1.0, 2.0**10]
+"""What holds of a mesh holds of one larger or smaller by a power of two."""
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize(("share", "closed"), [(0.99, True), (1.01, False)])
+def test_a_triangle_counts_that_is_higher_than_1e_12_of_the_diagonal(
+    scale: float, share: float, closed: bool
+) -> None:
+    """One more along an edge of a cube, as high as stated, closes nothing."""
+    height = share * 1e-12 * np.sqrt(12.0)
+    more = np.array([[[1, 1, 1], [1, 1 - height, 0.5], [1, 1, -1]]])
+    surface = Surface(scale * np.concatenate([BOX, more]))
+    why = surface.not_outside([0.0, 0.0, 0.0], 0.01)
+    assert why == ("it is inside" if closed else "the mesh is not closed")
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize(("share", "thin"), [(0.8, True), (1.01, False)])
+def test_walls_thinner_than_1e_6_of_the_diagonal_are_seen_from_both_sides(
+    scale: float, share: float, thin: bool
+) -> None:
+    """A thin shell within a cavity, seen from the middle."""
+    wall = share * 1e-6 * 16.0 * np.sqrt(3.0)
+    halves = (8.0, 1), (6.0, -1), (6.0 - wall, 1), (6.0 - 2.0 * wall, -1)
+    shells = np.concatenate([cube(half, sense=sense) for half, sense in halves])
+    why = Surface(scale * shells).not_outside([0.0, 0.0, 0.0], 0.01)
+    assert why == ("its faces are turned both ways" if thin else "")
+
+
+def test_tetrahedra_of_which_a_ray_meets_an_edge_are_wound_round_exactly() -> None:
+    """Of corners near and far; doubles leave many a sign in doubt."""
+    rng, counts = np.random.default_rng(12), np.zeros(2, int)
+    with ctx.workprec(128):
+        for _ in range(150):
+            corners, point = tetrahedron_at_a_ray(rng)
+            inside, faces = exactly(corners, point)
+            rays = list(crossings(faces, point))
+            counts[int(inside)] += 1
+            assert all(senses.sum() == inside for _, senses, _ in rays)
+            assert len(rays) >= len(RAYS) - 3
+    assert (counts > 5).all()
 
 
 def test_zeros_of_both_signs_are_one_place() -> None:

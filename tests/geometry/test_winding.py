@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.closed_solids import solid
+from oracles.closed_solids import exactly, solid, tetrahedron_at_a_ray
 
 from vdsm_pin.geometry import winding
 from vdsm_pin.geometry.winding import Side
@@ -86,6 +86,20 @@ def test_signs_that_rounding_may_turn_are_those_of_exact_arithmetic() -> None:
         assert found.sense.tolist() == [exact[0]] * bool(exact[0])
         crossed += bool(exact[0])
     assert 100 < crossed < 200
+
+
+def test_tetrahedra_of_which_a_ray_meets_an_edge_are_wound_round_exactly() -> None:
+    """Of corners near and far; doubles leave many a sign in doubt."""
+    rng, counts = np.random.default_rng(11), np.zeros(2, int)
+    for _ in range(150):
+        corners, point = tetrahedron_at_a_ray(rng)
+        inside, faces = exactly(corners, point)
+        view = winding._View(faces, point)
+        hits = [one for ray in winding.RAYS if (one := view.hits(ray)) is not None]
+        counts[int(inside)] += 1
+        assert all(one.sense.sum() == inside for one in hits)
+        assert len(hits) >= winding.N_RAYS - 3
+    assert (counts > 5).all()
 
 
 def test_rays_are_spread_over_all_directions() -> None:

@@ -231,7 +231,9 @@ def test_pcd_of_any_fields_is_what_numpy_reads(
     ]
     table = np.zeros(9, np.dtype(fields))
     for name in names:
-        table[name] = rng.integers(0, 100, table[name].shape)
+        shape, sign = table[name].shape, table[name].dtype.kind
+        low, high = (0, 250) if sign == "u" else (-120, 120)
+        table[name] = rng.integers(low, high, shape)
     columns = b"".join(table[name].tobytes() for name in names)
     rows = [" ".join(f"{v:g}" for name in names for v in row[name]) for row in table]
     body = {

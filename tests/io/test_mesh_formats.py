@@ -2,6 +2,7 @@
 
 import io
 import json
+import struct
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -127,6 +128,47 @@ def test_ply_of_any_order_with_other_elements_and_values(
     assert len(mesh.triangles) == 12
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
     assert abs(np.einsum("ij,ij->", a, np.cross(b, c)) / 6) == pytest.approx(1.0)
+
+
+PLY_KINDS = {
+    "b": ("char", "int8"), "B": ("uchar", "uint8"), "h": ("short", "int16"),
+    "H": ("ushort", "uint16"), "i": ("int", "int32"), "I": ("uint", "uint32"),
+    "f": ("float", "float32"), "d": ("double", "float64"),
+}  # fmt: skip
+"""Letter that `struct` has for a type, and names that PLY has for it."""
+
+
+@pytest.mark.parametrize("order", [">", "<"])
+@pytest.mark.parametrize("letter", PLY_KINDS)
+def test_numbers_of_a_ply_are_those_that_struct_packs(
+    tmp_path: Path, letter: str, order: str
+) -> None:
+    """Of each type the least, the largest and -1 as a coordinate; lists as long."""
+    bits = 8 * struct.calcsize(f"={letter}")
+    least, most = (0, 2**bits - 1) if letter.isupper() else (-(2 ** (bits - 1)), 7)
+    xs = (-1.5, 1e11, 2.0) if letter in "fd" else (least, max(least, -1), most)
+    name = {">": "binary_big_endian", "<": "binary_little_endian"}[order]
+    corners = b"".join(struct.pack(f"{order}{letter}bb", x, k, k * k)
+                       for k, x in enumerate(xs))  # fmt: skip
+    for word in PLY_KINDS[letter]:
+        counted = "uchar" if letter in "fd" else word
+        head = (
+            f"ply\nformat {name} 1.0\nelement vertex 3\nproperty {word} x\n"
+            "property char y\nproperty int8 z\nelement face 2\n"
+            f"property list {counted} uchar vertex_index\nend_header\n"
+        ).encode()
+        sized = "B" if letter in "fd" else letter
+        for sizes in ((3, 3), (3, 4)):  # all alike, and one by one
+            lists = [struct.pack(f"{order}{sized}{n}B", n, *range(3), *[0] * (n - 3))
+                     for n in sizes]  # fmt: skip
+            mesh = read_mesh(write(tmp_path, "a.ply", head + corners + b"".join(lists)))
+            found = sorted(mesh.vertices.tolist(), key=lambda row: row[1])
+            assert [row[0] for row in found] == np.array(xs, letter).tolist()
+            assert [row[1:] for row in found] == [[0, 0], [1, 1], [2, 4]]
+        if letter.islower() and letter not in "fd":  # a list of -1 is damage
+            wrong = struct.pack(f"{order}{letter}", -1) + bytes(1 << 17)
+            with pytest.raises(InvalidFile, match="is cut short"):
+                read_mesh(write(tmp_path, "a.ply", head + corners + lists[0] + wrong))
 
 
 def scene(rng: np.random.Generator) -> trimesh.Scene:

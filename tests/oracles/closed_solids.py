@@ -8,12 +8,14 @@ point, away from their surfaces.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from fractions import Fraction
+from typing import Any, Final
 
 import numpy as np
 import trimesh
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.winding import RAYS
 
 CLEAR: Final = 0.05
 """Points are no nearer to a surface; the shells are about 1 large; [m]."""
@@ -105,6 +107,46 @@ def sample_points(mesh: Made, rng: np.random.Generator, count: int) -> list[Floa
     surface = trimesh.Trimesh(*mesh.indexed(), process=False)
     nearest = trimesh.proximity.closest_point_naive(surface, tried)[1]
     return list(tried[nearest > CLEAR][:count])
+
+
+# ---- tetrahedra that rays hardly meet ------------------------------------------------
+
+
+def tetrahedron_at_a_ray(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Four corners near and far, and a point of which a ray passes by an edge.
+
+    The ray meets the edge but for rounding, and the edge's ends are up to 1e12 times as
+    far away as one another.
+    """
+    point, ray = rng.normal(size=3), RAYS[rng.integers(len(RAYS))]
+    aside = np.cross(ray, rng.normal(size=3))
+    far, off = 10.0 ** rng.uniform(-6.0, 6.0, (2, 2))
+    ends = far[:, None] * ray + (off * [1.0, -1.0])[:, None] * aside
+    others = 10.0 ** rng.uniform(-6.0, 6.0, (2, 1)) * rng.normal(size=(2, 3))
+    if rng.random() < 0.5:  # behind the point, which may lie inside then
+        others -= (1.0 + rng.random()) * np.abs(others @ ray)[:, None] * ray
+    return point + rng.permutation(np.concatenate([ends, others])), point
+
+
+def exactly(corners: FloatArray, point: FloatArray) -> tuple[bool, FloatArray]:
+    """Whether a point lies in a tetrahedron, and its faces, turned outwards.
+
+    By exact arithmetic; corners of shape (4, 3), faces (4, 3, 3).
+    """
+    exact = [[Fraction(float(x)) for x in corner] for corner in [*corners, point]]
+
+    def sense(a: int, b: int, c: int, d: int) -> int:
+        sides: Any = [[x - y for x, y in zip(exact[k], exact[d], strict=True)]
+                      for k in (a, b, c)]  # fmt: skip
+        (p, q, r), (s, t, u), (v, w, x) = sides
+        value = p * (t * x - u * w) - q * (s * x - u * v) + r * (s * w - t * v)
+        return int(value > 0) - int(value < 0)
+
+    around = [(0, 1, 2, 3), (0, 3, 1, 2), (0, 2, 3, 1), (1, 3, 2, 0)]
+    outwards = [(a, b, c) if sense(a, b, c, d) > 0 else (c, b, a)
+                for a, b, c, d in around]  # fmt: skip
+    inside = all(sense(*face, 4) > 0 for face in outwards)
+    return inside, corners[np.array(outwards)]
 
 
 # ---- ways of writing a mesh badly ----------------------------------------------------

@@ -30,10 +30,16 @@ ROOM = 0.4
 """Between the boxes at the start; [m]."""
 
 
-def slid(folder: Path, x: list[float], required: float, start: float = 0.0) -> Check:
+def slid(
+    folder: Path,
+    x: list[float],
+    required: float,
+    start: float = 0.0,
+    scene: str = WALL,
+) -> Check:
     """The row of obstacles as the box slides from place to place, a second each."""
     write(folder, "slider.urdf", SLIDER)
-    cell = read_cell(write(folder, "cell.yaml", WALL.format(required=required)))
+    cell = read_cell(write(folder, "cell.yaml", scene.format(required=required)))
     times = start + np.arange(float(len(x)))
     result = verify_robot(cell, Motion(np.array(x)[:, None], times=times))
     assert not result.not_done
@@ -52,6 +58,17 @@ def test_a_contact_begins_and_ends_where_the_closed_form_says(
     assert row.last_moment == pytest.approx(5.0 + (0.6 - limit) / 0.9, abs=off)
     assert (row.too_close_intervals, row.too_close_stretches) == (4, 2)
     assert "4 intervals in 2 stretches" in row.where
+
+
+def test_contacts_with_two_walls_are_counted_together(tmp_path: Path) -> None:
+    """Of 60 intervals four hold a contact, two with either wall."""
+    places = [0.0] * 10 + [0.45] + [0.0] * 30 + [-0.5] + [0.0] * 19
+    wall = WALL.splitlines()[-1]
+    behind = wall.replace("wall", "behind").replace("[0.6", "[-0.6")
+    row = slid(tmp_path, places, 0.0, scene=f"{WALL}{behind}\n")
+    assert row.first_moment == pytest.approx(9.0 + ROOM / 0.45, abs=2e-6)
+    assert row.last_moment == pytest.approx(42.0 - ROOM / 0.5, abs=2e-6)
+    assert (row.too_close_intervals, row.too_close_stretches) == (4, 2)
 
 
 def test_a_contact_all_along_begins_with_the_first_row_and_ends_with_the_last(

@@ -11,6 +11,7 @@ from vdsm_pin.problem.desired_path import DesiredPath, Order
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.drawing import check_order, coverage
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import Check, Verdict
@@ -69,12 +70,21 @@ def test_the_change_per_row_is_judged_only_where_it_is_limited() -> None:
 def test_the_tip_may_be_off_by_its_tolerance_and_no_farther(tolerance: float) -> None:
     problem, motion = drawing()
     problem = replace(problem, tip_tolerance=tolerance)
-    for part, verdict in ((0.999, Verdict.CERTIFIED), (1.001, Verdict.REFUTED)):
-        off = motion.x0 + np.where(np.arange(161) == 50, part * tolerance, 0.0)
-        row = named(check_tip(problem, replace(motion, x0=off)).checks, "at the way")
-        assert (row.verdict, row.moment) == (verdict, 50)
-        assert row.limit == tolerance
-        off = motion.x0 + np.where(np.arange(161) == 0, part * tolerance, 0.0)
+    pad = TOLERANCES.arithmetic  # rounding is on the safe side
+    for most, verdict in (
+        (0.999 * tolerance, Verdict.CERTIFIED),
+        (tolerance - 1.1 * pad, Verdict.CERTIFIED),
+        (tolerance - 0.9 * pad, Verdict.REFUTED),
+        (1.001 * tolerance, Verdict.REFUTED),
+    ):
+        off = motion.x0 + np.where(np.arange(161) == 50, most, 0.0)
+        report = check_tip(problem, replace(motion, x0=off))
+        row = named(report.checks, "at the way")
+        assert (row.verdict, row.moment, row.count) == (verdict, 50, 161)
+        assert (row.limit, row.unit) == (tolerance, "m")
+        assert row.worst == pytest.approx(most, abs=0.01 * pad)
+        assert (report.coverage > 0.999) is (verdict is Verdict.CERTIFIED)
+        off = motion.x0 + np.where(np.arange(161) == 0, most, 0.0)
         row = named(check_tip(problem, replace(motion, x0=off)).checks, "tip at its st")
         assert row.verdict is verdict
 

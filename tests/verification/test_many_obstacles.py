@@ -10,13 +10,14 @@ import pytest
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.geometry.arrays import IntArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Box
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_arm, coal_check, robust
 from vdsm_pin.verification.brackets import ClearanceChunk
@@ -146,3 +147,28 @@ def test_of_very_many_obstacles_coal_measures_the_nearest_link_of_far_ones(
     (fewer,) = coal_check.check_coal(problem, motion)
     assert full.verdict is fewer.verdict is Verdict.CERTIFIED
     assert 120 + 21 <= fewer.count < full.count
+
+
+def test_of_a_far_obstacle_the_link_is_measured_that_comes_nearest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, motion = cloud(2), swaying()
+    arm, room = coal_arm.CoalArm(problem), 0.1
+
+    def unseen() -> tuple[IntArray, IntArray]:
+        *_, (row, pair) = arm._near(motion, room, 0.0, NO_LIMIT)
+        beside = arm.pairs.other[pair] >= arm.pairs.n_own  # obstacles, no links
+        return row[beside], pair[beside]
+
+    (row, pair), every = unseen(), {}
+    found = arm.measured(motion, row.astype(float), pair).distance
+    for other, one, far in zip(arm.pairs.other[pair], pair, found, strict=True):
+        every.setdefault(int(other), {})[int(one)] = far
+    monkeypatch.setattr(coal_arm, "MANY", 100)
+    least = [int(one) for one in unseen()[1]]
+    assert {*least} < {*pair.tolist()}
+    others = arm.pairs.other[least].tolist()
+    assert len({*others}) == len(others)
+    assert {other for other, links in every.items() if len(links) == 8} <= {*others}
+    for one, other in zip(least, others, strict=True):  # a bound told it, not Coal
+        assert every[other][one] <= min(every[other].values()) + 0.05

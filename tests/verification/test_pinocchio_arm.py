@@ -148,8 +148,12 @@ def test_an_unknown_link_is_no_number() -> None:
 
 
 def test_angles_of_another_arm_are_refused() -> None:
-    with pytest.raises(InvalidInput, match=r"\(4, 7\).*expected \(4, 8\)"):
-        load_arm(HRM8).joint_centres(np.zeros(4), np.zeros((4, 7)), np.zeros((4, 7)))
+    fit, arm = np.zeros((4, 8)), load_arm(HRM8)
+    assert arm.joint_centres(np.zeros(4), fit, fit).shape == (4, 9, 3)
+    for other in (np.zeros((4, 7)), np.zeros((3, 8)), np.zeros(8)):
+        for angles in ((other, other), (other, fit), (fit, other)):
+            with pytest.raises(InvalidInput, match=r"expected \(4, 8\)"):
+                arm.joint_centres(np.zeros(4), *angles)
 
 
 @pytest.mark.parametrize(
