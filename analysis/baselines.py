@@ -4,16 +4,18 @@
 
 Writes `baselines.json` and `baselines.md`: for each method and scene whether the motion
 is certified, and what it is like; with `--sample K` also K problems of each feasible
-family of HRM-1000, fewer of them for slow methods. Methods are those of
+family of HRM-1000, as many as begin within `--minutes`. Methods are those of
 `benchmarks/hrm2000/references`.
 """
 
 import argparse
 import os
 import tempfile
+import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import product
+from math import inf
 from pathlib import Path
 from statistics import median
 from typing import Final
@@ -29,6 +31,7 @@ from benchmarks.hrm1000.families import FAMILIES
 from benchmarks.hrm1000.generate import generate
 from benchmarks.hrm2000.attempt import Outcome, attempt
 from benchmarks.hrm2000.references import REFERENCES
+from benchmarks.hrm2000.references.intelligent import GENERATIONS, MEMBERS
 from vdsm_pin.io.problem_file import built_in_text
 from vdsm_pin.units import MM_PER_M
 
@@ -39,8 +42,8 @@ METHODS: Final = {
     "pseudo-inverse": "[1]",
     "damped-least-squares": "[2,3], with a push off obstacles in the null space",
     "gradient-projection": "[4,5]",
-    "differential-evolution": "[11,12], by scipy; evolution and swarms go waypoint by "
-    "waypoint, near the one before",
+    "differential-evolution": "[11,12]; evolution and swarms go waypoint by waypoint, "
+    "near the one before",
     "vlv-de": "[25], evolution of vectors of any length: how many links turn",
     "particle-swarm": "[9,10]",
     "genetic": "[13]",
@@ -62,18 +65,13 @@ LIMIT: Final = 60.0
 """Processor time for one plan of a paper's scene; [s]."""
 SAMPLE_LIMIT: Final = 5.0
 """The same for a problem of the sample; [s]."""
-FEWER: Final = 2
-"""Problems of each family for slow methods."""
-
 PER_FAMILY: Final = 112
 """Problems of HRM-1000 in a family."""
 INTELLIGENT: Final = tuple(
     name for name, where in REFERENCES.items() if where.startswith("intelligent:")
 )
-SLOW: Final = (*INTELLIGENT, "pink-barriers", "ompl-rrt-connect")
 COARSE_MM: Final = 20.0
-"""Spacing of waypoints for these, about a tenth of a second each; [mm]. Problems of
-HRM-1000 have it from the start."""
+"""Spacing of waypoints for these; [mm]. Problems of HRM-1000 have it from the start."""
 
 
 @dataclass(frozen=True)
@@ -112,15 +110,17 @@ def line(scene: str, found: Outcome) -> Line:
     )  # fmt: skip
 
 
-def sample(per_family: int, folder: Path) -> Iterator[Line]:
+def sample(per_family: int, folder: Path, minutes: float) -> Iterator[Line]:
     """The methods on the first problems of HRM-1000's feasible families."""
     families = [family for family in FAMILIES if family != "infeasible"]
+    end = time.monotonic() + 60.0 * minutes
     for number, family in product(range(per_family), families):
+        if family == families[0] and time.monotonic() > end:
+            return
         file = generate(folder / family, family, number)
         for method in METHODS:
-            if number < FEWER or method not in SLOW:
-                found = attempt(file, (family, number), method, SAMPLE_LIMIT)
-                yield line(f"{family}-{number:04d}", found)
+            found = attempt(file, (family, number), method, SAMPLE_LIMIT)
+            yield line(f"{family}-{number:04d}", found)
 
 
 MEASURED: Final = {
@@ -191,12 +191,12 @@ def markdown(lines: list[Line], sampled: list[Line]) -> str:
         "",
         f"The first {most // families} of the {PER_FAMILY} problems of each of the",
         f"{families} feasible families, {SAMPLE_LIMIT:.0f} s of processor time for",
-        f"each plan; slow methods get {FEWER} of each family. Those that evolve or",
-        "swarm have 120 generations of 102 members at each of some 200 waypoints: a",
-        "tenth of a second each, most of it for clearances, in compiled code.",
-        "Motions that the judge cannot decide count as refuted; not found are those",
-        "that ended by themselves, out of time those that the limit ended. Medians",
-        "are over the paths that are drawn whole and certified.",
+        f"each plan. Those that evolve or swarm have {GENERATIONS} generations of",
+        f"{MEMBERS} members for each unknown at a waypoint, and go on to the next as",
+        "soon as their best, brought onto the path, is valid. Motions that the judge",
+        "cannot decide count as refuted; not found are those that ended by",
+        "themselves, out of time those that the limit ended. Medians are",
+        "over the paths that are drawn whole and certified.",
         "",
     ]
     names = ("method", "certified", "refuted", "not found", "out of time", *MEASURED)
@@ -209,12 +209,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=REPORTS)
     parser.add_argument("--sample", type=int, default=0)
+    parser.add_argument("--minutes", type=float, default=inf)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for name in ("paper", "fewest"):  # machine code is loaded once
             list(lines_of(name, Path(folder)))
         lines = [one for name in METHODS for one in lines_of(name, Path(folder))]
-        sampled = list(sample(options.sample, Path(folder)))
+        sampled = list(sample(options.sample, Path(folder), options.minutes))
     rows = [*map(asdict, lines), *map(asdict, sampled)]
     write_table(options.out, "baselines", rows, markdown(lines, sampled))
 

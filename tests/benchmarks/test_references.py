@@ -1,6 +1,7 @@
 """The references that need no extra library, on scenes where the answer is known."""
 
 from dataclasses import replace
+from itertools import islice
 from math import inf
 
 import numpy as np
@@ -89,7 +90,8 @@ def test_intelligent_algorithms_find_the_bottom_of_a_bowl(name: str) -> None:
     rng = np.random.default_rng(8)
     bottom, box = rng.uniform(-0.5, 0.5, arm.nq), np.ones(arm.nq)
     task = Bowl(arm, np.zeros(arm.nq), bottom, -box, box, rng)
-    found = getattr(intelligent, name).__wrapped__(task)
+    search = getattr(intelligent, name).__wrapped__(task)
+    found = list(islice(search, intelligent.GENERATIONS))[-1]
     assert (np.abs(found) <= 1.0).all()
     assert task.cost(found[None]) < 0.1 * (bottom**2).sum()
 

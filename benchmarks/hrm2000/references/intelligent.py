@@ -2,18 +2,20 @@
 
 Penalties for the tip's place, limits and clearance; the best of each waypoint is
 brought onto the path by the pseudo-inverse, as chance does not get there exactly. All
-have as many members and generations. A search is given the penalty of rows (m, n), the
-bounds, the row before, and where chance comes from; it returns the best row, (n,).
+have as many members and at most as many generations; a search ends where the row that
+is brought there is valid, which is looked at after each tenth generation. A search is
+given the penalty of rows (m, n), the bounds, the row before, and where chance comes
+from; it yields the best row of each generation, (n,).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import wraps
+from itertools import islice
 from math import inf
 from typing import TypeAlias
 
 import numpy as np
-from scipy.optimize import differential_evolution as scipy_evolution
 
 from benchmarks.hrm2000.references.arm import Arm, Reach
 from benchmarks.hrm2000.references.jacobian import pseudo_inverse
@@ -21,6 +23,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.tolerances import TOLERANCES
 
 GENERATIONS = 120
+LOOK = 10  # generations
 MEMBERS = 6  # times 17 unknowns
 STRETCH = 0.05  # m, of the base
 MISS, TOUCH, CHANGE = 10.0, 10.0, 0.01
@@ -84,7 +87,7 @@ class Task:
         return rows[self.rng.permutation(len(rows))]
 
 
-Search: TypeAlias = Callable[[Task], FloatArray]
+Search: TypeAlias = Callable[[Task], Iterator[FloatArray]]
 
 
 def by(search: Search) -> Reach:
@@ -96,8 +99,11 @@ def by(search: Search) -> Reach:
         near[0] = STRETCH
         low, high = np.maximum(arm.low, q - near), np.minimum(arm.high, q + near)
         task = Task(arm, q, tip, low, high, np.random.default_rng(0))
-        best = pseudo_inverse(arm, search(task), tip)
-        return best if best is not None and arm.valid(best) else None
+        for found in islice(search(task), LOOK - 1, GENERATIONS, LOOK):
+            best = pseudo_inverse(arm, found, tip)
+            if best is not None and arm.valid(best):
+                return best
+        return None
 
     return reach
 
@@ -108,19 +114,25 @@ def least(rows: FloatArray, values: FloatArray) -> FloatArray:
 
 
 @by
-def differential_evolution(task: Task) -> FloatArray:
-    """[11,12], by scipy."""
-    found = scipy_evolution(
-        lambda members: task.cost(np.atleast_2d(members.T)),
-        list(zip(task.low, task.high, strict=True)), maxiter=GENERATIONS,
-        popsize=MEMBERS, rng=0, polish=False, x0=task.before, vectorized=True,
-        updating="deferred", tol=0.0,
-    )  # fmt: skip
-    return np.asarray(found.x)
+def differential_evolution(task: Task) -> Iterator[FloatArray]:
+    """[11,12], best/1/bin: the best, a difference of two others, entries crossed."""
+    rows = task.first()
+    values = task.cost(rows)
+    while True:
+        way = task.others(rows) - task.others(rows)
+        mutant = least(rows, values) + task.rng.uniform(0.5, 1.0) * way
+        crossed = task.rng.random(rows.shape) < 0.7
+        at_least = task.rng.integers(task.arm.nq, size=len(rows))
+        crossed[np.arange(len(rows)), at_least] = True
+        child = task.inside(np.where(crossed, mutant, rows))
+        found = task.cost(child, values)
+        better = found < values
+        rows[better], values[better] = child[better], found[better]
+        yield least(rows, values)
 
 
 @by
-def variable_length_evolution(task: Task) -> FloatArray:
+def variable_length_evolution(task: Task) -> Iterator[FloatArray]:
     """[25], VLV-DE: a member has as many link angles as it says, from the base on.
 
     The links behind them keep their angles of the row before. A child is one link
@@ -131,7 +143,7 @@ def variable_length_evolution(task: Task) -> FloatArray:
     lengths = task.rng.integers(1, task.arm.n + 1, len(rows))
     rows = np.where(links <= lengths[:, None], rows, task.before)
     values = task.cost(rows)
-    for _ in range(GENERATIONS):
+    while True:
         order = task.rng.permutation(len(rows))
         nearby = task.before + task.noise(rows, 0.1)
         parents = np.where(links <= lengths[:, None], rows, nearby)
@@ -144,15 +156,15 @@ def variable_length_evolution(task: Task) -> FloatArray:
         better = found < values
         rows[better], values[better] = child[better], found[better]
         lengths[better] = length[better]
-    return least(rows, values)
+        yield least(rows, values)
 
 
 @by
-def particle_swarm(task: Task) -> FloatArray:
+def particle_swarm(task: Task) -> Iterator[FloatArray]:
     """[9,10]: members fly towards their own best place and that of all."""
     rows = task.first()
     speed, best, values = np.zeros_like(rows), rows.copy(), task.cost(rows)
-    for _ in range(GENERATIONS):
+    while True:
         own, all_ = task.rng.random((2, *rows.shape))
         speed = 0.7 * speed + 1.5 * own * (best - rows)
         speed += 1.5 * all_ * (least(best, values) - rows)
@@ -160,11 +172,11 @@ def particle_swarm(task: Task) -> FloatArray:
         found = task.cost(rows, values)
         better = found < values
         best[better], values[better] = rows[better], found[better]
-    return least(best, values)
+        yield least(best, values)
 
 
 @by
-def genetic(task: Task) -> FloatArray:
+def genetic(task: Task) -> Iterator[FloatArray]:
     """[13]: the better of two become parents, children are mixed and mutate."""
     rows = task.first()
     values = task.cost(rows)
@@ -177,11 +189,11 @@ def genetic(task: Task) -> FloatArray:
         child = task.inside(child)
         child[0] = least(rows, values)  # the best one lives on
         rows, values = child, task.cost(child)
-    return least(rows, values)
+        yield least(rows, values)
 
 
 @by
-def simulated_annealing(task: Task) -> FloatArray:
+def simulated_annealing(task: Task) -> Iterator[FloatArray]:
     """[14]: every member a walk of its own, uphill less and less."""
     rows = task.first()
     values = task.cost(rows)
@@ -195,11 +207,11 @@ def simulated_annealing(task: Task) -> FloatArray:
         rows[taken], values[taken] = child[taken], found[taken]
         if values.min() < lowest:
             best, lowest = least(rows, values), values.min()
-    return best
+        yield best
 
 
 @by
-def fireflies(task: Task) -> FloatArray:
+def fireflies(task: Task) -> Iterator[FloatArray]:
     """[15-17]: each is drawn to a brighter one, the more the nearer it is."""
     rows = task.first()
     values = task.cost(rows)
@@ -213,15 +225,15 @@ def fireflies(task: Task) -> FloatArray:
         drawn = task.inside(drawn + task.noise(rows, 0.05 * 0.95**k))
         drawn[values.argmin()] = least(rows, values)
         rows, values = drawn, task.cost(drawn)
-    return least(rows, values)
+        yield least(rows, values)
 
 
 @by
-def bee_colony(task: Task) -> FloatArray:
+def bee_colony(task: Task) -> Iterator[FloatArray]:
     """[18]: bees look beside a food source; one that is used up is left."""
     rows = task.first()
     values, tired = task.cost(rows), np.zeros(len(rows))
-    for _ in range(GENERATIONS):
+    while True:
         chosen = np.argsort(values + task.rng.exponential(values.std(), len(rows)))
         chosen[len(rows) // 2 :] = np.arange(len(rows))[len(rows) // 2 :]
         beside = rows[chosen]
@@ -236,4 +248,4 @@ def bee_colony(task: Task) -> FloatArray:
         left = (tired > MEMBERS * 4) & (values > values.min())
         rows[left] = task.first()[left]
         values[left], tired[left] = task.cost(rows[left]), 0
-    return least(rows, values)
+        yield least(rows, values)
