@@ -56,6 +56,28 @@ def lowers(problem: PlanningProblem, motion: Trajectory) -> np.ndarray:
     return np.asarray(lower[: 8 * n].reshape(n, 8).min(axis=1))
 
 
+def test_many_obstacles_are_as_far_as_the_nearest_of_them() -> None:
+    """Oracle: every obstacle alone. Where links meet some, only the sign is meant."""
+    problem = cloud(7)
+    rng = np.random.default_rng(1)
+    # Some links begin in a box, some run along an axis, some are points.
+    begins = rng.uniform([0, -1, -1], [3.2, 1, 1], (300, 3))
+    begins[:100] = [box.centre for box in problem.scene.obstacles[:100]]
+    way = rng.normal(size=(300, 3)) * rng.choice([0.0, 0.1, 0.8], (300, 1))
+    way[::3, 1:] = 0.0
+    ends = np.stack([begins, begins + way], axis=1)
+    every = link_clearance(problem)(ends)[:, 0]
+    least = np.full(300, np.inf)
+    for obstacle in problem.scene.obstacles:
+        alone = replace(problem, scene=Scene((obstacle,)))
+        least = np.minimum(least, link_clearance(alone)(ends)[:, 0])
+    apart = least > -ARM.most_radius
+    assert (every <= -ARM.most_radius).tolist() == (~apart).tolist()
+    assert 20 < apart.sum() < 280
+    gap = TOLERANCES.bracket_gap
+    np.testing.assert_allclose(every[apart], least[apart], rtol=0, atol=gap)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_the_largest_joint_error_is_the_same(
     seed: int, monkeypatch: pytest.MonkeyPatch
