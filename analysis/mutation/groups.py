@@ -61,7 +61,7 @@ GROUPS: Final = (
     Group(
         "verification",
         (
-            "vdsm_pin/certificate_writer/[!r]*.py",
+            "vdsm_pin/certificate_writer/*.py",
             "vdsm_pin/verification/[!p]*.py",
             "vdsm_pin/verification/p[!a]*.py",
             "vdsm_pin/geometry/closed_meshes.py",

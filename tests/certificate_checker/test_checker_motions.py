@@ -12,7 +12,7 @@ from oracles.certificate_oracle import sealed, sha256
 from some_slow import few_of
 
 from vdsm_pin.certificate_checker import check_certificate
-from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.problem_file import read_problem

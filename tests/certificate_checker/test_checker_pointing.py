@@ -16,7 +16,7 @@ from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.certificate_checker.balls import SLACK, norm
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.certificate_checker.rows import PARTS, Rows
-from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory

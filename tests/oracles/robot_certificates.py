@@ -16,8 +16,8 @@ from oracles.certificate_cases import (
 )
 
 from vdsm_pin.certificate_checker import Outcome
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
-from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.robots.cell import read_cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
@@ -152,7 +152,7 @@ class Made:
         wrong = [row for row in found.checks if row.verdict is not Verdict.CERTIFIED]
         assert not wrong, wrong
         proof = self.folder / "good"
-        write_robot_certificate(proof, found, self.hashes())
+        write_certificate(proof, found, self.hashes())
         most = self.erring if self.cell.get("errors") else self.most
         accepted_closely(proof, *self.files, most=most)
         return certificate_lines(proof)[:-1]

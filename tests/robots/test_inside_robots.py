@@ -12,8 +12,8 @@ from tests.oracles.certificate_cases import certificate_lines
 from tests.oracles.certificate_oracle import sealed
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
-from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of_file
@@ -93,7 +93,7 @@ def test_verdicts_are_those_of_solid_angles(seed: int, tmp_path: Path) -> None:
         np.testing.assert_allclose(result.closest(1)[0].link_point, [0.5, 0, 0])
         clear = next(check for check in result.checks if check.name == OBSTACLES)
         assert clear.first_moment == 0.0
-        assert clear.where.startswith("arm and shell; first too close at waypoint 0")
+        assert clear.where == "link 'arm' is inside 'shell'"
 
 
 def test_between_two_shells_is_outside_and_in_their_wall_is_not(tmp_path: Path) -> None:
@@ -157,7 +157,7 @@ def test_the_checker_asks_for_the_inside_too(tmp_path: Path) -> None:
         source = cell_in(tmp_path, mesh).source
         assert source is not None
         hashes = Hashes(source.sha256, sha256_of_file(files[1]))
-        write_robot_certificate(tmp_path / "c", found, hashes)
+        write_certificate(tmp_path / "c", found, hashes)
         outcome = check_certificate(tmp_path / "c", *files)
         assert outcome.accepted is is_outside
         if not is_outside:
@@ -170,7 +170,7 @@ def certified(cell: Cell, folder: Path) -> Any:
     assert found.verdict is Verdict.CERTIFIED
     assert source is not None
     hashes = Hashes(source.sha256, sha256_of_file(folder / "t.csv"))
-    write_robot_certificate(folder / "c", found, hashes)
+    write_certificate(folder / "c", found, hashes)
     return check_certificate(folder / "c", folder / "cell.yaml", folder / "t.csv")
 
 

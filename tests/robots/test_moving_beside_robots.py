@@ -8,8 +8,8 @@ import pytest
 
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
-from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of_file
@@ -158,7 +158,7 @@ def test_certificates_beside_what_moves(seed: int, tmp_path: Path) -> None:
         source = read_cell(problem).source
         assert source is not None
         hashes = Hashes(source.sha256, sha256_of_file(file))
-        write_robot_certificate(proof, found, hashes)
+        write_certificate(proof, found, hashes)
         return check_certificate(proof, problem, file)
 
     assert outcome().accepted

@@ -9,8 +9,8 @@ from oracles.random_robots import MESH, random_urdf
 
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
-from vdsm_pin.certificate_writer.robot import write_robot_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io import bags
@@ -176,7 +176,7 @@ def test_certificate_is_of_both_trajectories(tmp_path: Path) -> None:
             source = read_cell(tmp_path / "left.yaml").source
             assert source is not None
             hashes = Hashes(source.sha256, sha256_of_file(file))
-            write_robot_certificate(proof, found, hashes)
+            write_certificate(proof, found, hashes)
         return check_certificate(proof, tmp_path / "left.yaml", file)
 
     assert outcome().accepted
@@ -223,7 +223,7 @@ def test_another_robot_moves_by_a_topic_of_a_bag(tmp_path: Path) -> None:
     assert cell.source is not None
     assert {one.name for one in cell.source.files} >= {"metadata.yaml", "right.db3"}
     hashes = Hashes(cell.source.sha256, sha256_of_file(file))
-    write_robot_certificate(proof, found, hashes)
+    write_certificate(proof, found, hashes)
     assert check_certificate(proof, problem, file).accepted
     write(tmp_path, "left.yaml", chosen.replace("/plan", "/far"))
     assert "of another problem file" in check_certificate(proof, problem, file).reason
@@ -289,6 +289,6 @@ def test_random_pairs_keep_what_dense_samples_by_coal_say(
     if found.verdict is Verdict.CERTIFIED:
         assert cell.source is not None
         hashes = Hashes(cell.source.sha256, sha256_of_file(file))
-        write_robot_certificate(tmp_path / "proof", found, hashes)
+        write_certificate(tmp_path / "proof", found, hashes)
         outcome = check_certificate(tmp_path / "proof", problem, file)
         assert outcome.accepted, outcome.reason

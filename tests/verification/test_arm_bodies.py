@@ -28,7 +28,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.arm.mounted import LinkBody, Tool
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.certificate_checker.solids import solid as checker_solid
-from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry import solids

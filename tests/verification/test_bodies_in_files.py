@@ -20,7 +20,7 @@ from oracles.certificate_oracle import sealed, sha256
 from vdsm_pin.arm.bodies import ArmBody, arm_bodies
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.certificate_checker import Outcome, check_certificate
-from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, InvalidInput

@@ -14,6 +14,7 @@ from vdsm_pin.arm.mounted import Feed
 from vdsm_pin.certificate_writer import lines as certificate_lines
 from vdsm_pin.errors import CertificateTooLarge
 from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.geometry.winding import Location, Side
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -66,9 +67,9 @@ from vdsm_pin.verification.enclosed import (
     enclosed_checks,
     enclosed_least,
     enclosed_profile,
-    pairs_inside,
 )
 from vdsm_pin.verification.first_contact import FirstContact
+from vdsm_pin.verification.inside import Place
 from vdsm_pin.verification.moving import (
     MOST_PARTS,
     PART,
@@ -259,17 +260,11 @@ def test_a_profile_is_by_intervals_of_the_motion(stride: int) -> None:
 def test_the_arm_is_inside_until_its_axis_may_meet_the_surface(seed: int) -> None:
     rng, asked = np.random.default_rng([4, seed]), problem()
     pairs, least = arm_assembly(asked).pairs, -ARM.least_radius
-    blank: Any = np.zeros(3)
-    enclosed: Any = {
-        "a": {"link 2": blank, "link 3": blank},
-        "b": {},
-        "c": {"link 1": blank},
-    }
+    bodies = {("a", "link 2"), ("a", "link 3"), ("c", "link 1")}
+    mine = [k for k, p in enumerate(pairs) if (p.obstacle, p.own) in bodies]
     got: list[ClearanceChunk] = []
-    sink, left = (
-        EnclosedSink(got.append, pairs, pairs_inside(asked, pairs, enclosed)),
-        {name: False for name in NAMES},
-    )
+    sink = EnclosedSink(got.append, dict.fromkeys(mine, Inside(np.zeros(3), least)))
+    left = set[int]()
     for part in range(4):
         chunk = random_chunk(rng, 5 * part, 5, len(pairs))
         lower = np.abs(chunk.lower) + rng.choice(
@@ -280,37 +275,29 @@ def test_the_arm_is_inside_until_its_axis_may_meet_the_surface(seed: int) -> Non
         sink(chunk)
         expected = {f.name: np.array(getattr(chunk, f.name)) for f in fields(chunk)}
         for k in range(5):
-            for name, bodies in enclosed.items():
-                mine = [
-                    i
-                    for i, p in enumerate(pairs)
-                    if p.obstacle == name and p.own in bodies
-                ]
-                left[name] |= any(lower[k, i] <= least for i in mine)
-                for i in mine:
-                    expected["lower"][k, i] = least
-                    if not left[name]:
-                        expected["upper"][k, i] = least
-                        expected["verdict"][k, i] = REFUTED
-                        expected["other_point"][k, i] = chunk.link_point[k, i]
+            left |= {i for i in mine if lower[k, i] <= least}
+            for i in mine:
+                expected["lower"][k, i] = least
+                if i not in left:
+                    expected["upper"][k, i] = least
+                    expected["verdict"][k, i] = REFUTED
+                    expected["other_point"][k, i] = chunk.link_point[k, i]
         for name, truth in expected.items():
             assert np.array_equal(getattr(got[-1], name), truth), name
 
 
 def test_a_profile_has_the_depth_of_what_is_inside() -> None:
-    rng, asked = np.random.default_rng(5), problem()
-    least, blank = -ARM.least_radius, np.zeros(3)
+    rng, asked = np.random.default_rng(5), arm_assembly(problem())
+    least = -ARM.least_radius
+    bodies = {("c", "link 2"), ("a", "link 1"), ("a", "link 8")}
+    mine = [k for k, p in enumerate(asked.pairs) if (p.obstacle, p.own) in bodies]
     for _ in range(20):
         lower, upper = rng.uniform(-0.02, 1.0, (2, 7, 3))
         lower[rng.random((7, 3)) < 0.1] = least
         links = rng.uniform(-0.2, 0.5, (2, 7, ARM.n_links))
         profile = ClearanceProfile(*links, lower, upper, np.arange(7))
-        assert enclosed_profile(profile, asked, {}) is profile
-        enclosed: Any = {
-            "c": {"link 2": blank},
-            "a": {"link 1": blank, "link 8": blank},
-        }
-        found = enclosed_profile(profile, asked, enclosed)
+        inside = dict.fromkeys(mine, Inside(np.zeros(3), least))
+        found = enclosed_profile(profile, asked, inside)
         for name, inside in (("a", (0, 7)), ("b", ()), ("c", (1,))):
             column, left = NAMES.index(name), not inside
             for k in range(7):
@@ -717,11 +704,17 @@ def test_what_begins_inside_is_refuted_from_the_beginning() -> None:
         ),
         Check("b", Verdict.UNDECIDED, 7, 0.5, 0.1, "m"),
     )
-    assert enclosed_checks(rows, (), ()) is rows
-    for worst, depths in ((-0.04, [-0.03, -0.04]), (0.5, [])):
-        refuted, other = enclosed_checks(rows, ("hall", "room"), depths)
+    asked = arm_assembly(problem())
+    where = {(p.obstacle, p.own): k for k, p in enumerate(asked.pairs)}
+    outside, within = (Place(Location(s), point) for s in (Side.OUTSIDE, Side.INSIDE))
+    places = {where["a", "link 1"]: outside, where["c", "link 2"]: outside}
+    assert enclosed_checks(rows, asked, places) is rows
+    places |= {where["a", "link 2"]: within, where["b", "link 3"]: within}
+    for worst, first in ((-0.5, -0.5), (-ARM.least_radius, 0.5)):
+        told = replace(rows[0], worst=first), rows[1]
+        refuted, other = enclosed_checks(told, asked, places)
         assert other is rows[1] and refuted.worst == worst
-        assert refuted.where == "the arm is inside 'hall'; the arm is inside 'room'"
+        assert refuted.where == "the arm is inside 'a'; the arm is inside 'b'"
         assert (refuted.verdict, refuted.count) == (Verdict.REFUTED, 7)
         assert refuted.moment == refuted.first_moment == 0.0
         assert np.isnan(refuted.last_moment) and refuted.deeper is True

@@ -14,7 +14,7 @@ from oracles.certificate_oracle import sealed, sha256
 from vdsm_pin.api import write_report
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.certificate_checker import check_certificate
-from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import rotation_from_rpy

@@ -13,7 +13,7 @@ from oracles.certificate_oracle import sha256
 
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.certificate_writer import lines as lines_module
-from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.certificate_writer.schema import certificate_schema
 from vdsm_pin.errors import CertificateTooLarge, InvalidFile

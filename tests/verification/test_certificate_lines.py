@@ -10,9 +10,12 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from vdsm_pin.certificate_checker.program import VERSION
-from vdsm_pin.certificate_writer.arm import _triangles, pieces_of_obstacles
 from vdsm_pin.certificate_writer.lines import PER_METRE, _counted
-from vdsm_pin.certificate_writer.links import link_pieces
+from vdsm_pin.certificate_writer.pieces import (
+    _triangles,
+    link_pieces,
+    pieces_of_obstacles,
+)
 from vdsm_pin.certificate_writer.schema import (
     ErrorLimits,
     HeaderLine,

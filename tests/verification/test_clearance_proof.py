@@ -15,9 +15,10 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.facts import min_clearance
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.inside import check_inside, locate_start
+from vdsm_pin.verification.inside import check_inside, located_at_start
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
@@ -240,7 +241,8 @@ def test_an_arm_inside_a_closed_mesh_is_refuted() -> None:
         problem = problem_with(cube(half, centre))
         proof, _ = prove(problem, still)
         assert proof.counts[:, 0].sum() == proof.counts.sum()
-        (check,) = check_inside(locate_start(problem, still))
+        motion = AskedMotion.of_arm(problem, still, NOMINAL)
+        (check,) = check_inside(motion.asked, located_at_start(motion))
         assert check.verdict is verdict
 
 
@@ -248,7 +250,8 @@ def test_a_mesh_said_to_be_a_surface_is_judged_as_one_and_the_row_says_so() -> N
     still = trajectory(np.zeros(1), np.zeros((1, 8)), np.zeros((1, 8)))
     mesh = replace(cube(5.0, np.zeros(3)), solid=False)
     problem = problem_with(mesh)
-    assert check_inside(locate_start(problem, still)) == ()
+    motion = AskedMotion.of_arm(problem, still, NOMINAL)
+    assert check_inside(motion.asked, located_at_start(motion)) == ()
     rows = {row.name: row for row in verify(problem, still).checks}
     clearance = rows["clearance from obstacles"]
     assert clearance.verdict is Verdict.CERTIFIED

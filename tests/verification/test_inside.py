@@ -22,7 +22,7 @@ from oracles.closed_solids import (
 
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate, main
-from vdsm_pin.certificate_writer.arm import write_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
 from vdsm_pin.geometry.arrays import FloatArray

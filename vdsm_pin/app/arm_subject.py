@@ -96,7 +96,7 @@ class ArmSubject:
     ) -> None:
         """Write the certificate of a verification."""
         # Imported by those who ask for one: its schema takes a while to build.
-        from vdsm_pin.certificate_writer.arm import write_certificate
+        from vdsm_pin.certificate_writer.certificate import write_certificate
 
         write_certificate(path, verification, hashes, self.options.deadline)
 

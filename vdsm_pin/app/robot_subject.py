@@ -92,10 +92,10 @@ class RobotSubject:
         self, path: Path, verification: RobotVerification, hashes: "Hashes"
     ) -> None:
         """Write the certificate of a verification."""
-        from vdsm_pin.certificate_writer.robot import write_robot_certificate
+        from vdsm_pin.certificate_writer.certificate import write_certificate
 
-        more = self.options.topic, self.options.deadline
-        write_robot_certificate(path, verification, hashes, *more)
+        more = self.options.deadline, self.options.topic
+        write_certificate(path, verification, hashes, *more)
 
     def repair(
         self, motion: JointTrajectory, pinned: Sequence[int]

@@ -139,7 +139,7 @@ class Arm:
         return near.frame < far.frame and not self._ignored(*names)
 
     def check_outside(self, first: Any) -> None:
-        """Check that the arm is clear of a mesh's hull, or begins outside.
+        """Check that what is not clear of a mesh's hull begins outside.
 
         A body never meets the mesh's triangles, so one point of it decides; that at O_1
         for links, tool and feed where all of them are held off the mesh.
@@ -150,9 +150,9 @@ class Arm:
         own = [body for body in self.bodies if body.own]
         thinnest = min(body.solid.radius for body in own)
         for mesh in (mesh for mesh in self.meshes.values() if mesh.split):
-            pairs, points = [pair for pair in self.pairs if pair.solid is mesh], []
-            held = [pair.body for pair in pairs]
-            if all(body in held for body in own):
+            held = [pair for pair in self.pairs if pair.solid is mesh]
+            pairs, points = [p for p in held if p.body.solid in mesh.split], []
+            if {*own} <= {p.body for p in held} and any(p.body.own for p in pairs):
                 points = [(first[1], column(0, 0, 0), thinnest)]
                 pairs = [pair for pair in pairs if not pair.body.own]
             points += [pair.inner(first) for pair in pairs]

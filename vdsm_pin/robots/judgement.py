@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, first_equal
-from vdsm_pin.geometry.winding import Side
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.budget import Budget
@@ -16,13 +15,6 @@ from vdsm_pin.proof.prover import Proof
 from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.inside import (
-    by_mesh,
-    enclosed_contacts,
-    enclosed_profile,
-    locate_links,
-    pairs_inside,
-)
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.asked_motion import AskedMotion
@@ -35,9 +27,19 @@ from vdsm_pin.verification.coal_shapes import disagreement
 from vdsm_pin.verification.contact_search import contacts_of
 from vdsm_pin.verification.contacts import MEETING
 from vdsm_pin.verification.counterexample import find_counterexamples, in_rows
-from vdsm_pin.verification.enclosed import enclosed_least
+from vdsm_pin.verification.enclosed import (
+    enclosed_checks,
+    enclosed_least,
+    enclosed_profile,
+    pairs_inside,
+)
 from vdsm_pin.verification.first_contact import FirstContact
-from vdsm_pin.verification.inside import LINKS_OUTSIDE, check_inside
+from vdsm_pin.verification.inside import (
+    LINKS_OUTSIDE,
+    check_inside,
+    is_outside,
+    located,
+)
 from vdsm_pin.verification.limits import checks_of_others
 from vdsm_pin.verification.records import Check, Verdict, Verification
 
@@ -77,11 +79,12 @@ def verify_robot(
     motion = AskedMotion.of_robot(cell.asked, path, cell.errors)
     knots, named = motion.knots, cell.asked.pairs
     proof = motion.proof(budget)
-    located = locate_links(cell, motion, budget)
+    places = located(motion, deadline)
+    inside = pairs_inside(cell.asked, places)
     least = least_clearances(cell.asked, proof)
     proved = with_depths(motion, least, deadline=deadline)
     coal, measured = _coal(cell, motion, proof)
-    least = enclosed_least(proved, pairs_inside(located))
+    least = enclosed_least(proved, inside)
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
     sought = motion.in_itself, least, proof.lower_interval, deadline
     lost = extras.take("search for counterexamples", (), find_counterexamples, *sought)
@@ -91,7 +94,7 @@ def verify_robot(
         met = extras.take("first contact", (), contacts_of, *of_all, balls=True)
     lost, least = in_rows(lost, knots), least_in_rows(least, knots)
     name = "proof of the motion without errors"
-    clear = bool(lost) and extras.take(name, False, _is_clear, cell, motion, budget)
+    clear = bool(lost) and extras.take(name, False, _is_clear, motion, budget, deadline)
     evidence = Evidence(
         pairs=named,
         least=least,
@@ -99,15 +102,14 @@ def verify_robot(
         deepest=lambda k, worst: bool(least.verdict[k] == REFUTED) and worst <= MEETING,
         counterexamples=lost,
         nominal=clear,
-        contacts=tuple(
-            one.timed(path) for one in enclosed_contacts(met, named, located)
-        ),
+        contacts=met,
     )
+    rows = clearance_checks(cell, evidence, None if proof.in_time else deadline)
     checks = [
         *checks_by_itself(robot, path),
         *checks_of_others(cell.scene),
-        *check_inside(by_mesh(cell, located), LINKS_OUTSIDE),
-        *clearance_checks(cell, evidence, None if proof.in_time else deadline),
+        *check_inside(cell.asked, places, LINKS_OUTSIDE),
+        *enclosed_checks(rows, cell.asked, places),
         *([coal] if named else [_no_pair(cell)]),
     ]
     nearest = nearest_pairs(named, least).items()
@@ -121,7 +123,7 @@ def verify_robot(
         pairs=named,
         checks=tuple(checks),
         approaches=approaches,
-        profile=enclosed_profile(profile, cell, located),
+        profile=enclosed_profile(profile, cell.asked, inside),
         least=least,
         counterexamples=lost,
         nominal_clear=clear,
@@ -136,12 +138,10 @@ def _no_pair(cell: Cell) -> Check:
     return Check(LINKS, Verdict.UNDECIDED, 0, nan, needed, "m", NO_PAIR)
 
 
-def _is_clear(cell: Cell, motion: AskedMotion, budget: Budget) -> bool:
+def _is_clear(motion: AskedMotion, budget: Budget, deadline: Deadline) -> bool:
     """Whether the motion is proved clear of everything, without errors."""
     nominal = motion.under(ErrorBox())
-    located = locate_links(cell, nominal, budget).values()
-    outside = all(one.where.side is Side.OUTSIDE for one in located)
-    return outside and nominal.proof(budget).is_certified
+    return is_outside(located(nominal, deadline)) and nominal.proof(budget).is_certified
 
 
 def _coal(cell: Cell, motion: AskedMotion, proof: Proof) -> tuple[Check, FloatArray]:

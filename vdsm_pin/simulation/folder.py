@@ -23,7 +23,8 @@ from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
-from vdsm_pin.verification.inside import arm_inside, check_inside, locate_arm
+from vdsm_pin.verification.enclosed import enclosed_least, pairs_inside
+from vdsm_pin.verification.inside import check_inside, located
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import combine
 
@@ -191,17 +192,11 @@ def cleared(
     """
     errors = problem.errors.widened(errors)
     proof = prove_clearance(problem, trajectory, errors)
-    located = locate_arm(problem, trajectory, errors)
-    rows = [*check_clearance(problem, proof, ()), *check_inside(located)]
+    asked, places = proof.motion.asked, located(proof.motion)
+    rows = [*check_clearance(problem, proof, ()), *check_inside(asked, places)]
     verdict = combine(tuple(row.verdict for row in rows))
-    near = [
-        lower
-        for pair, lower in zip(proof.pairs, proof.least.lower.tolist(), strict=True)
-        if pair.obstacle
-    ]
-    if arm_inside(located):
-        near.append(-problem.manipulator.least_radius)
-    least = finite(min(near, default=float("inf")))
+    proved = enclosed_least(proof.least, pairs_inside(asked, places))
+    least = finite(float(proved.lower[asked.outer].min(initial=np.inf)))
     return Cleared(verdict=verdict.value, min_clearance_m=least)
 
 

@@ -41,6 +41,9 @@ class Assembly:
         column_errors: Of errors those of the columns of q, shape (n_columns,), to which
             the base adds its own; [rad], [m].
         packed: Pieces of the obstacles, then of the bodies, where they are packed.
+        chain: How many of the first bodies hang together, links, tool and feed of a
+            snake arm: off a mesh's triangles all are on that side of it on which the
+            origin of the first one's frame is. 0 where each goes by itself.
     """
 
     own_tree: Tree
@@ -52,6 +55,7 @@ class Assembly:
     table: PairTable
     column_errors: Callable[[ErrorBox], FloatArray]
     packed: PackedPieces | None = None
+    chain: int = 0
 
     @cached_property
     def tree(self) -> Tree:

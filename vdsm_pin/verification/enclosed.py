@@ -1,29 +1,31 @@
-"""Clearances from a mesh that the arm is inside of.
+"""Clearances from a mesh that bodies are inside of.
 
 What is proved is the distance from the mesh's surface. Of a solid the clearance is
 negative all over its inside: as for every other obstacle around a link's axis it is
-reported as minus the link's radius, whatever the depth. That is said of what begins
-inside; what reaches out through the surface has its distance from that.
+reported as minus the radius about the core, whatever the depth. That is said of what
+begins inside, until its core may meet the surface; what reaches out through the surface
+has its distance from that.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, replace
 from math import nan
 from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
-from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.winding import Side
 from vdsm_pin.proof.terms import REFUTED
+from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.brackets import (
     ClearanceChunk,
     ClearanceProfile,
     ClearanceSink,
     LeastClearances,
 )
-from vdsm_pin.verification.inside import Enclosed
-from vdsm_pin.verification.records import Check, Pair, Verdict
+from vdsm_pin.verification.inside import Places, by_mesh
+from vdsm_pin.verification.records import Check, Verdict
 
 
 class Inside(NamedTuple):
@@ -38,59 +40,41 @@ class Inside(NamedTuple):
     clearance: float
 
 
-def pairs_inside(
-    problem: PlanningProblem, pairs: Sequence[Pair], enclosed: Enclosed
-) -> dict[int, Inside]:
-    """The pairs of an arm that begin inside a mesh, by their numbers."""
-    balls = _balls(problem)
+def pairs_inside(asked: Assembly, places: Places) -> dict[int, Inside]:
+    """The pairs of a body that begins inside a mesh, by their numbers."""
     return {
-        k: Inside(enclosed[pair.obstacle][pair.own], -balls[pair.own])
-        for k, pair in enumerate(pairs if enclosed else ())
-        if pair.own in enclosed.get(pair.obstacle, ())
+        k: Inside(one.point, 0.0 - asked.ball(k))
+        for k, one in places.items()
+        if one.where.side is Side.INSIDE
     }
 
 
-def _balls(problem: PlanningProblem) -> dict[str, float]:
-    """Radius about the core of each body of the arm, by its name; [m]."""
-    return {body.name: body.ball for body in problem.manipulator.convex_bodies}
-
-
 class EnclosedSink:
-    """Corrects chunks for the meshes that the arm is inside of and passes them on.
-
-    The arm stays inside until the core of a body may meet the surface.
+    """Corrects chunks for the bodies that are inside of meshes and passes them on.
 
     Args:
         sink: Receives the corrected chunks.
-        pairs: Every pair.
-        inside: Those that begin inside a mesh.
+        inside: The pairs that begin inside a mesh.
     """
 
-    def __init__(
-        self, sink: ClearanceSink, pairs: Sequence[Pair], inside: Mapping[int, Inside]
-    ) -> None:
-        self.sink, by_mesh = sink, dict[str, list[int]]()
-        for k in inside:
-            by_mesh.setdefault(pairs[k].obstacle, []).append(k)
-        self.columns = [np.array(each) for each in by_mesh.values()]
-        self.depths = [
-            np.array([inside[k].clearance for k in each]) for each in by_mesh.values()
-        ]
-        self.left = [False] * len(self.columns)
+    def __init__(self, sink: ClearanceSink, inside: Mapping[int, Inside]) -> None:
+        self.sink, self.columns = sink, np.array([*inside], np.int64)
+        self.depths = np.array([one.clearance for one in inside.values()])
+        self.left = np.zeros(len(inside), np.bool_)
 
     def __call__(self, chunk: ClearanceChunk) -> None:
         """Correct one chunk and pass it on."""
         lower, upper = chunk.lower.copy(), chunk.upper.copy()
         verdict, other_point = chunk.verdict.copy(), chunk.other_point.copy()
-        for k, columns in enumerate(self.columns):
-            meets = (chunk.lower[:, columns] <= self.depths[k]).any(axis=1)
-            out = np.logical_or.accumulate(meets) | self.left[k]
-            self.left[k] = bool(out[-1])
-            inside = np.ix_(~out, columns)
-            lower[:, columns] = self.depths[k]
-            upper[inside] = self.depths[k]
-            verdict[inside] = REFUTED
-            other_point[inside] = chunk.link_point[inside]
+        meets = chunk.lower[:, self.columns] <= self.depths
+        out = np.logical_or.accumulate(meets) | self.left
+        self.left = out[-1]
+        lower[:, self.columns] = self.depths
+        row, which = np.nonzero(~out)
+        inside = row, self.columns[which]
+        upper[inside] = self.depths[which]
+        verdict[inside] = REFUTED
+        other_point[inside] = chunk.link_point[inside]
         self.sink(
             replace(
                 chunk,
@@ -103,37 +87,35 @@ class EnclosedSink:
 
 
 def enclosed_profile(
-    profile: ClearanceProfile, problem: PlanningProblem, enclosed: Enclosed
+    profile: ClearanceProfile, asked: Assembly, inside: Mapping[int, Inside]
 ) -> ClearanceProfile:
-    """The profile with the meshes that the arm is inside of as solids."""
-    if not enclosed:
-        return profile
-    arm, balls = problem.manipulator, _balls(problem)
-    lower, upper = profile.obstacle_lower.copy(), profile.obstacle_upper.copy()
-    link_lower, link_upper = profile.link_lower.copy(), profile.link_upper.copy()
-    for name, bodies in enclosed.items():
-        column = problem.scene.names.index(name)
-        least = -min((balls[body] for body in bodies), default=arm.least_radius)
-        mine: BoolArray = ~np.logical_or.accumulate(lower[:, column] <= least)
-        lower[:, column] = upper[mine, column] = least
-        for link in range(arm.n_links):
-            if (own := f"link {link + 1}") in bodies:
-                depth = -balls[own]
-                link_lower[:, link] = np.minimum(link_lower[:, link], depth)
-                link_upper[mine, link] = np.minimum(link_upper[mine, link], depth)
-    return replace(
-        profile,
-        link_lower=frozen(link_lower),
-        link_upper=frozen(link_upper),
-        obstacle_lower=frozen(lower),
-        obstacle_upper=frozen(upper),
-    )
+    """The profile with meshes as solids.
+
+    Args:
+        profile: As proved of the surfaces.
+        asked: What is held apart.
+        inside: The pairs that begin inside a mesh.
+    """
+    changed = {one.name: getattr(profile, one.name).copy() for one in fields(profile)}
+    for k, one in inside.items():
+        own, partner = asked.sides(k)
+        obstacle, depth = partner - len(asked.own), one.clearance
+        met = profile.obstacle_lower[:, obstacle] <= depth
+        within = ~np.logical_or.accumulate(met)
+        columns = {"link": max(0, asked.links[own] - 1), "obstacle": obstacle}
+        for name, column in columns.items():
+            for side, rows in (("lower", slice(None)), ("upper", within)):
+                values = changed[f"{name}_{side}"]
+                values[rows, column] = np.minimum(values[rows, column], depth)
+    for values in changed.values():
+        values.setflags(write=False)
+    return ClearanceProfile(**changed)
 
 
 def enclosed_least(
     least: LeastClearances, inside: Mapping[int, Inside]
 ) -> LeastClearances:
-    """The least clearances with meshes as solids, of an arm or a robot.
+    """The least clearances with meshes as solids.
 
     Args:
         least: What is proved of the surfaces.
@@ -147,22 +129,26 @@ def enclosed_least(
 
 
 def enclosed_checks(
-    rows: tuple[Check, ...], meshes: Collection[str], clearances: Iterable[float]
+    rows: tuple[Check, ...], asked: Assembly, places: Places
 ) -> tuple[Check, ...]:
     """The rows of the clearance, the one from obstacles first.
 
     Args:
         rows: As proved of the surfaces.
-        meshes: Names of those that the arm is inside of.
-        clearances: Of the bodies inside; [m].
+        asked: What is held apart.
+        places: Where bodies begin as seen from meshes.
     """
-    if not meshes:
+    inside = pairs_inside(asked, places).values()
+    if not inside:
         return rows
+    within = by_mesh(asked, places).items()
     refuted = replace(
         rows[0],
         verdict=Verdict.REFUTED,
-        worst=min([rows[0].worst, *clearances]),
-        where="; ".join(f"the arm is inside {name!r}" for name in meshes),
+        worst=min([rows[0].worst, *(one.clearance for one in inside)]),
+        where="; ".join(
+            where.words(name) for name, where in within if where.side is Side.INSIDE
+        ),
         moment=0.0,
         first_moment=0.0,
         last_moment=nan,

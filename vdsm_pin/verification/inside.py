@@ -1,42 +1,40 @@
-"""Whether the arm is inside a mesh: where its base is as the motion begins.
+"""Whether bodies are inside a mesh: where they are as the motion begins.
 
-The arm is connected and the clearance proof keeps its axis off the surface, so one
-point of one row decides for the whole motion, also where the mesh moves. What links
-carry may be apart from them, and some links may not be held off the mesh: there a point
-of each body decides. Where the inside of a mesh cannot be told, the arm is outside if
-it is proved to keep its clearance from the mesh's hull.
+Every convex part that is proved to keep off a mesh's triangles stays on its side of
+them, also where the mesh moves, so one point of it at the first row decides for the
+whole motion. A snake arm hangs together: where links, tool and feed are all held off a
+mesh, O_1 decides for them. Where the inside of a mesh cannot be told, a body is outside
+if it is proved to keep its clearance from the mesh's hull.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
-from vdsm_pin.arm.bodies import ArmBody
-from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.errors import OutOfTime
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
 from vdsm_pin.problem.any_problem import AnyProblem
-from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Moving, Scene, solid_of, with_hulls
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.problem.scene import solid_of
+from vdsm_pin.proof.bodies import PairTable
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.prover import answer
+from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.asked_motion import AskedMotion
+from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.records import Check, Verdict, combine
 
 ARM_OUTSIDE: Final = "arm outside the meshes"
 LINKS_OUTSIDE: Final = "links outside the meshes"
 """Names of the row of evidence: of a snake arm, and of any other robot."""
-
-Enclosed: TypeAlias = Mapping[str, Mapping[str, FloatArray]]
-"""Bodies inside a mesh, by its name and theirs, each with a point there; base frame."""
 
 VERDICTS: Final = {
     Side.INSIDE: Verdict.REFUTED,
@@ -45,207 +43,180 @@ VERDICTS: Final = {
 }
 
 
-def locate_start(
-    problem: PlanningProblem, trajectory: Trajectory
-) -> dict[str, Location]:
-    """On which side of each mesh that may have an inside the arm begins.
+class Place(NamedTuple):
+    """Where a body begins as seen from a mesh, and a point of it that tells.
 
-    A mesh has the location of the first point of the arm that is inside it; of the
-    first point whose side is not known where none is inside.
-
-    Returns:
-        Locations by name of the mesh.
+    Args:
+        where: As seen from the mesh.
+        point: In the base frame, shape (3,); [m].
     """
-    return {
-        mesh.name: worst_location(
-            [
-                locate(mesh.closed_mesh, point, radius)
-                for point, radius in _points(problem, trajectory, mesh.name)
-            ]
+
+    where: Location
+    point: FloatArray
+
+
+Places: TypeAlias = Mapping[int, Place]
+"""Where bodies begin as seen from the meshes that may have an inside, by the number of
+their pair."""
+
+
+def located_at_start(motion: AskedMotion) -> dict[int, Place]:
+    """Where each body begins as seen from each mesh that it is held off."""
+    asked, found = motion.asked, dict[int, Place]()
+    solids = enumerate(map(solid_of, asked.scene.obstacles), start=len(asked.own))
+    meshes = [(k, one) for k, one in solids if isinstance(one, Mesh)]
+    meshes = [(k, one) for k, one in meshes if not one.is_surface]
+    poses = asked.poses(motion.path.knots[:1])[0] if meshes else np.zeros((0, 4, 4))
+    for number, mesh in meshes:
+        pairs = np.flatnonzero(asked.table.one == number)
+        found |= _as_seen_from(mesh, number, asked, pairs, poses)
+    return found
+
+
+def _as_seen_from(
+    mesh: Mesh, number: int, asked: Assembly, pairs: IntArray, poses: FloatArray
+) -> dict[int, Place]:
+    """Where the bodies of some pairs are as seen from the mesh that all are held off.
+
+    Args:
+        mesh: In its own frame.
+        number: Its own among the bodies.
+        asked: What is held apart.
+        pairs: Numbers of the pairs, shape (m,).
+        poses: Of all frames, shape (n_frames, 4, 4); [m].
+    """
+    rest, found = poses[asked.bodies[number].frame], dict[int, Place]()
+
+    def seen(pose: FloatArray, at: FloatArray, off: float, who: str) -> Place:
+        point = pose[:3, :3] @ at + pose[:3, 3]
+        place = (point - rest[:3, 3]) @ rest[:3, :3]
+        return Place(locate(mesh.closed_mesh, place, off)._replace(who=who), point)
+
+    numbers = asked.table.other[pairs].tolist()
+    chain = range(asked.chain if {*range(asked.chain)} <= {*numbers} else 0)
+    for k, number in zip(pairs.tolist(), numbers, strict=True):
+        body, keeps = asked.own[number], float(asked.table.required[k])
+        pose, who = (
+            poses[body.frame],
+            "the arm" if asked.chain else f"link {body.name!r}",
         )
-        for mesh in map(solid_of, problem.scene.obstacles)
-        if isinstance(mesh, Mesh) and not mesh.is_surface
-    }
+        if chain and number == 0:
+            first = seen(pose, np.zeros(3), min(asked.balls[: len(chain)]), who)
+        if number in chain and (number == 0 or first.where.side is not Side.INSIDE):
+            found[k] = first
+        else:
+            parts = map(_middle, body.pieces)
+            found[k] = _worst(seen(pose, at, off + keeps, who) for at, off in parts)
+    return found
 
 
-def worst_location(found: Sequence[Location]) -> Location:
-    """The worst of some locations: inside before unknown before outside.
+def _middle(piece: Piece) -> tuple[FloatArray, float]:
+    """A point of a convex part of a body, and how far off its skin it lies; [m]."""
+    if isinstance(piece, FlatCylinder):
+        return piece.centre, 0.0
+    assert isinstance(piece, Hull)  # nothing that moves is a half-space
+    return piece.points.mean(axis=0), piece.radius
 
-    Args:
-        found: Any number; the result is outside where there are none.
-    """
+
+def _worst(places: Iterable[Place]) -> Place:
+    """The first of the worst: inside before unknown before outside."""
     order = list(VERDICTS)
-    none = Location(Side.OUTSIDE)
-    return min(found, key=lambda one: order.index(one.side), default=none)
+    return min(places, key=lambda one: order.index(one.where.side))
 
 
-def _points(
-    problem: PlanningProblem, trajectory: Trajectory, mesh: str
-) -> list[tuple[FloatArray, float]]:
-    """Points at the first row in a mesh's frame, and how far off it they stay; [m].
-
-    O_1 for links, tool and feed where all of them are held off the mesh, otherwise the
-    middle of each that is; the middle of everything that is carried.
-    """
-    arm = problem.manipulator
-    bodies = _middles(problem, trajectory)
-    own = [body for body, _ in bodies if not body.carried]
-    points = []
-    if not any(arm.ignores(body.name, mesh) for body in own):
-        thinnest = min(body.ball for body in own)
-        points.append((_origin(problem, trajectory), thinnest))
-        bodies = [one for one in bodies if one[0].carried]
-    points += [
-        (middle, body.ball + problem.required_clearance)
-        for body, middle in bodies
-        if not arm.ignores(body.name, mesh)
-    ]
-    pose = _pose_at_start(problem, trajectory, mesh)
-    return [(_seen_from(pose, point), off) for point, off in points]
-
-
-def _origin(problem: PlanningProblem, trajectory: Trajectory) -> FloatArray:
-    """O_1 at the first row, shape (3,); [m]."""
-    return np.array([trajectory.x0[0], 0.0, 0.0])
-
-
-def _middles(
-    problem: PlanningProblem, trajectory: Trajectory
-) -> list[tuple[ArmBody, FloatArray]]:
-    """Each body of the arm with the middle of its corners at the first row; [m]."""
-    row = [0]
-    joints = trajectory.x0[row], trajectory.alpha[row], trajectory.theta[row]
-    centres = joint_centres(problem.manipulator, *joints)[0]
-    frames = link_frames(*joints[1:])[0]
-    found = []
-    for body in problem.manipulator.convex_bodies:
-        turned = frames[body.link - 1] if body.link else np.eye(3)
-        middle = turned @ body.corners.mean(axis=0)
-        found.append((body, centres[max(0, body.link - 1)] + middle))
-    return found
-
-
-def _seen_from(pose: FloatArray, point: FloatArray) -> FloatArray:
-    """A point of the base frame in the frame that stands at a pose, shape (3,); [m]."""
-    return np.asarray((point - pose[:3, 3]) @ pose[:3, :3])
-
-
-def bodies_inside(
-    problem: PlanningProblem, trajectory: Trajectory, meshes: Collection[str]
-) -> Enclosed:
-    """The bodies of the arm that begin inside some meshes.
-
-    A body that is left out reaches out through the surface of the mesh; its clearance
-    is the distance from that surface.
+def located(motion: AskedMotion, deadline: Deadline = NO_LIMIT) -> dict[int, Place]:
+    """On which side of each mesh that may have an inside each body is.
 
     Args:
-        problem: Arm and scene.
-        trajectory: The motion, of which the first row counts.
-        meshes: Names of meshes that the arm is inside of.
-    """
-    solids = {one.name: solid_of(one) for one in problem.scene.obstacles}
-    middles = _middles(problem, trajectory)
-    found: dict[str, dict[str, FloatArray]] = {}
-    for name in meshes:
-        mesh, pose = solids[name], _pose_at_start(problem, trajectory, name)
-        assert isinstance(mesh, Mesh)
-        sides = [
-            locate(mesh.closed_mesh, _seen_from(pose, middle), np.inf).side
-            for _, middle in middles
-        ]
-        found[name] = {
-            body.name: middle
-            for (body, middle), side in zip(middles, sides, strict=True)
-            if side is Side.INSIDE
-        }
-    return found
-
-
-def _pose_at_start(
-    problem: PlanningProblem, trajectory: Trajectory, name: str
-) -> FloatArray:
-    """T_base_obstacle at the first row, shape (4, 4); [m]."""
-    one = next(one for one in problem.scene.obstacles if one.name == name)
-    if not isinstance(one, Moving) or trajectory.times is None:
-        return np.eye(4)
-    return np.asarray(one.poses(trajectory.times[:1])[0])
-
-
-def unlocated(located: Mapping[str, Location]) -> tuple[str, ...]:
-    """Names of the meshes whose inside cannot be told."""
-    found = located.items()
-    return tuple(name for name, where in found if where.side is Side.UNKNOWN)
-
-
-def locate_arm(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    errors: ErrorBox,
-    deadline: Deadline = NO_LIMIT,
-) -> dict[str, Location]:
-    """On which side of each mesh that may have an inside the arm is, by its name.
-
-    Args:
-        problem: Arm, scene, required clearance.
-        trajectory: The motion.
-        errors: The result holds for every motion within this error box.
+        motion: What is asked; the result holds for every motion within its errors.
         deadline: What is not proved by then stays unknown.
     """
-    found = locate_start(problem, trajectory)
-    doubtful = unlocated(found)
-    if not doubtful:
+    found = located_at_start(motion)
+    unknown = unlocated(found)
+    if not unknown:
         return found
-    scene = Scene(tuple(o for o in problem.scene.obstacles if o.name in doubtful))
-    hulls = replace(problem, scene=with_hulls(scene, doubtful))
-    proof = prove_clearance(hulls, trajectory, errors, deadline=deadline)
-    clear = _clear_of(doubtful, proof)
-    if proof.late:
-        late = f"; {OutOfTime(deadline.limit)}"
-        found = {n: one._replace(reason=one.reason + late) for n, one in found.items()}
-    return found | dict.fromkeys(clear, Location(Side.OUTSIDE))
+    asked = question_of_hulls(motion, unknown, unknown)
+    proof = answer(asked, motion.path, Budget(until=deadline.end))
+    late = "" if proof.in_time else f"; {OutOfTime(deadline.limit)}"
+    for k, verdict in zip(unknown, proof.verdict.tolist(), strict=True):
+        where = found[k].where
+        where = where._replace(reason=where.reason + late)
+        where = Location(Side.OUTSIDE) if verdict == CERTIFIED else where
+        found[k] = found[k]._replace(where=where)
+    return found
 
 
-def _clear_of(names: Collection[str], proof: ClearanceProof) -> tuple[str, ...]:
-    """Which obstacles every body held off them is proved to keep its clearance from."""
-    near = {
-        pair.obstacle
-        for pair, counts in zip(proof.pairs, proof.counts, strict=True)
-        if counts[CERTIFIED] < counts.sum()
-    }
-    return tuple(name for name in names if name not in near)
+def unlocated(places: Places) -> list[int]:
+    """Numbers of the pairs of which it is not known on which side the body is."""
+    return [k for k, one in places.items() if one.where.side is Side.UNKNOWN]
 
 
-def arm_inside(located: Mapping[str, Location]) -> tuple[str, ...]:
-    """Names of the meshes that the arm is inside of."""
-    found = located.items()
-    return tuple(name for name, where in found if where.side is Side.INSIDE)
+def question_of_hulls(
+    motion: AskedMotion, hulled: Sequence[int], pairs: Sequence[int] | None = None
+) -> Question:
+    """What is asked, with hulls of meshes in place of the meshes in some pairs.
+
+    The hulls are bodies behind all others, each once, in the order of the pairs.
+
+    Args:
+        motion: What is asked.
+        hulled: Numbers of the pairs that are asked of the hull of their mesh.
+        pairs: Numbers of the pairs that are asked; None for all.
+    """
+    held, table, box = motion.asked, motion.asked.table, motion.asked.box(motion.errors)
+    one, n = table.one.copy(), len(held.bodies)
+    meshes = list(dict.fromkeys(one[hulled].tolist()))
+    bodies, surfaces = [*held.bodies], np.asarray(box.surfaces)
+    for number in meshes:
+        mesh = cast("Mesh", solid_of(held.scene.obstacles[number - len(held.own)]))
+        bodies.append(replace(bodies[number], pieces=mesh.hull.pieces))
+    one[hulled] = [n + meshes.index(number) for number in one[hulled].tolist()]
+    which = np.arange(table.size) if pairs is None else np.array(pairs)
+    asked = PairTable(one[which], table.other[which], table.required[which])
+    box = replace(box, surfaces=np.append(surfaces, surfaces[meshes]))
+    return Question.of(held.tree, bodies, asked, box)
+
+
+def by_mesh(asked: Assembly, places: Places) -> dict[str, Location]:
+    """What of each mesh says the most against the motion, by its name."""
+    found = dict[str, list[Place]]()
+    for k, one in places.items():
+        found.setdefault(asked.pair(k).obstacle, []).append(one)
+    return {name: _worst(each).where for name, each in found.items()}
+
+
+def is_outside(places: Places) -> bool:
+    """Whether every body is known to be outside of every mesh."""
+    return all(one.where.side is Side.OUTSIDE for one in places.values())
 
 
 def check_inside(
-    located: Mapping[str, Location], name: str = ARM_OUTSIDE
+    asked: Assembly, places: Places, name: str = ARM_OUTSIDE
 ) -> tuple[Check, ...]:
     """The row of evidence that no body held apart from a mesh is inside it.
 
     Args:
-        located: What `locate_arm` found.
+        asked: What is held apart.
+        places: What `located` found.
         name: Of the row.
 
     Returns:
         One row for all meshes that may have an inside; none without.
     """
-    if not located:
+    if not places:
         return ()
-    verdict = combine(tuple(VERDICTS[found.side] for found in located.values()))
+    meshes = by_mesh(asked, places)
+    verdict = combine(tuple(VERDICTS[found.side] for found in meshes.values()))
     bad = {
         name: found
-        for name, found in located.items()
+        for name, found in meshes.items()
         if VERDICTS[found.side] is verdict is not Verdict.CERTIFIED
     }
     return (
         Check(
             name=name,
             verdict=verdict,
-            count=len(located),
+            count=len(meshes),
             worst=float(len(bad)),
             limit=0.0,
             unit="-",

@@ -77,4 +77,5 @@ def arm_assembly(problem: PlanningProblem) -> Assembly:
         ),
         column_errors=lambda errors: np.append(0.0, errors.angles(arm.n_links)),
         packed=problem.packed,
+        chain=sum(not body.carried for body in which.bodies),
     )

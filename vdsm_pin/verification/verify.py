@@ -9,7 +9,6 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.winding import Location, Side
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import with_hulls
@@ -35,11 +34,11 @@ from vdsm_pin.verification.enclosed import (
 )
 from vdsm_pin.verification.first_contact import Noted, TooClose
 from vdsm_pin.verification.inside import (
-    arm_inside,
-    bodies_inside,
+    Places,
     check_inside,
-    locate_arm,
-    locate_start,
+    is_outside,
+    located,
+    located_at_start,
     unlocated,
 )
 from vdsm_pin.verification.limits import check_limits, checks_of_others
@@ -86,10 +85,9 @@ def verify(
     """
     _check_input(problem, trajectory)
     model, box = load_arm(problem.manipulator), problem.errors
-    located = locate_arm(problem, trajectory, box, deadline)
-    enclosed = bodies_inside(problem, trajectory, arm_inside(located))
     motion = AskedMotion.of_arm(problem, trajectory, box)
-    inside = pairs_inside(problem, motion.asked.pairs, enclosed)
+    places = located(motion, deadline)
+    inside = pairs_inside(motion.asked, places)
     reach = coal_reach(problem) if reach is None else reach
     proved = _proved(problem, trajectory, motion, inside, sinks, deadline, reach)
     proof, extras = proved.proof, BestEffort()
@@ -97,14 +95,17 @@ def verify(
     name = "search for counterexamples"
     counterexamples = extras.take(name, (), proof.counterexamples, deadline)
     name, asked = "proof of the motion without errors", (problem, trajectory, deadline)
-    clear = bool(counterexamples) and extras.take(name, False, _is_clear, *asked)
+    clear = bool(counterexamples) and extras.take(
+        name, False, _is_clear, motion, *asked
+    )
     about = problem, trajectory, motion, proof.least, deadline, proved.too_close
     contacts = extras.take("first contact", (), contacts_of, *about)
     if sinks and proof.sent < motion.n_intervals:
         extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
     near_misses = closest_approaches(problem, trajectory, motion.asked, least)
-    log = CoalLog(near_misses, tuple(enclosed))
+    around = dict.fromkeys(proof.pairs[k].obstacle for k in inside)
+    log = CoalLog(near_misses, tuple(around))
     clearance = check_clearance(
         problem, proof, counterexamples, contacts, deadline, nominal=clear
     )
@@ -114,23 +115,21 @@ def verify(
         *checks_of_others(problem.scene),
         *tip.checks,
         *guarded(pointing.NAME, pointing.check_pointing, *asked, box),
-        *check_inside(located),
-        *enclosed_checks(
-            clearance, enclosed, (one.clearance for one in inside.values())
-        ),
+        *check_inside(motion.asked, places),
+        *enclosed_checks(clearance, motion.asked, places),
         *guarded(COAL, check_coal, problem, trajectory, proved.lowers, log, deadline),
         *guarded(cable_check.NAME, cable_check.check_cables, *asked),
     ]
     survived = nan, nan
     if joint_error:
-        survived = _survived(problem, trajectory, proof, located, extras, deadline)
+        survived = _survived(problem, trajectory, proof, places, extras, deadline)
     return ArmVerification(
         problem=problem,
         trajectory=trajectory,
         pairs=proof.pairs,
         checks=tuple(checks),
         approaches=tuple(log.approaches),
-        profile=enclosed_profile(proof.profile, problem, enclosed),
+        profile=enclosed_profile(proof.profile, motion.asked, inside),
         tip_deviation=tip.deviation,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
@@ -170,10 +169,9 @@ def _proved(
     reach: float,
 ) -> _Proved:
     """The clearance of every pair; `sinks` and `reach` are those of `verify`."""
-    pairs = motion.asked.pairs
-    wanted = [EnclosedSink(one, pairs, inside) if inside else one for one in sinks]
+    wanted = [EnclosedSink(one, inside) if inside else one for one in sinks]
     lowers = LowersSink(problem, trajectory)
-    noted = TooClose(pairs, motion.n_intervals)
+    noted = TooClose(motion.asked.pairs, motion.n_intervals)
     if sinks or lowers.fits:
         wanted += [lowers.keep, noted]
     reach = math.inf if inside else reach
@@ -184,19 +182,21 @@ def _proved(
 
 
 def _is_clear(
-    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline
+    motion: AskedMotion,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    deadline: Deadline,
 ) -> bool:
     """Whether the motion without errors is proved clear of everything."""
-    motion = problem, trajectory, ErrorBox(), deadline
-    outside = all(one.side is Side.OUTSIDE for one in locate_arm(*motion).values())
-    return outside and is_certified(*motion)
+    outside = is_outside(located(motion.under(ErrorBox()), deadline))
+    return outside and is_certified(problem, trajectory, ErrorBox(), deadline)
 
 
 def _survived(
     problem: PlanningProblem,
     motion: Trajectory,
     proof: ClearanceProof,
-    located: Mapping[str, Location],
+    places: Places,
     extras: BestEffort,
     deadline: Deadline,
 ) -> tuple[float, float]:
@@ -206,9 +206,10 @@ def _survived(
     Where the inside of a mesh cannot be told, its hull stands for it in what is
     certified, and the mesh itself in what is refuted.
     """
-    if any(where.side is not Side.OUTSIDE for where in located.values()):
+    if not is_outside(places):
         return 0.0, nan
-    hulls, hulled = unlocated(locate_start(problem, motion)), problem
+    doubtful = unlocated(located_at_start(proof.motion))
+    hulls, hulled = {proof.pairs[k].obstacle for k in doubtful}, problem
     if hulls:  # else with what the problem keeps packed
         hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
     lower = np.append(proof.least.lower, np.inf)  # -1 is no pair
