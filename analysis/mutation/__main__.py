@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import cache
 from multiprocessing.queues import Queue
 from pathlib import Path
 from typing import Final
@@ -42,12 +43,29 @@ WIDER: Final = 5
 
 
 def equivalent_changes() -> dict[str, str]:
-    """Reason by key of each change that is known to change nothing."""
-    if not EQUIVALENT.exists():
+    """Reason by key of each change that is known to change nothing.
+
+    What names another line by now than it was judged of is left out, and told.
+    """
+    found = {}
+    for row in EQUIVALENT.read_text(encoding="utf-8").splitlines()[1:]:
+        key, reason, *judged = row.split(" || ")
+        lines = _lines_of(key.partition(":")[0])
+        line = lines.get(key.removesuffix(" (all)"))
+        if line is None or (judged and judged[0] != line):
+            print(f"no such change: {key}", flush=True)
+        else:
+            found[key] = reason
+    return found
+
+
+@cache
+def _lines_of(module: str) -> dict[str, str]:
+    """The line of each change of a module, by key."""
+    if not (ROOT / module).exists():
         return {}
-    lines = EQUIVALENT.read_text(encoding="utf-8").splitlines()
-    rows = (line.partition(" | ") for line in lines if line and line[0] != "#")
-    return {key: reason for key, _, reason in rows}
+    source = (ROOT / module).read_text(encoding="utf-8").splitlines()
+    return {c.key: source[c.line - 1].strip() for c in changes(ROOT, module)}
 
 
 def reason_of(key: str, known: dict[str, str]) -> str | None:
@@ -60,22 +78,11 @@ def is_equivalent(key: str, known: dict[str, str]) -> bool:
     return reason_of(key, known) is not None
 
 
-def gone(every: list[Change], known: dict[str, str]) -> list[str]:
-    """Keys that name no change of these modules, or a module that is not there."""
-    keys = {one.key for one in every}
-    keys |= {key.partition(" (no. ")[0] + " (all)" for key in keys}
-    modules = {one.module for one in every}
-    there = {k: k.partition(":")[0] for k in known if k not in keys}
-    return [k for k, m in there.items() if m in modules or not (ROOT / m).exists()]
-
-
 def sampled(groups: list[Group], size: int, seed: int) -> dict[str, list[Change]]:
-    """A sample of all changes, by group; tells what is listed and gone."""
+    """A sample of all changes, by group."""
     every = [
         (g.name, c) for g in groups for m in modules_of(g) for c in changes(ROOT, m)
     ]
-    for key in gone([change for _, change in every], equivalent_changes()):
-        print(f"no such change: {key}", flush=True)
     chosen = random.Random(seed).sample(every, min(size, len(every)))
     return {g.name: [c for name, c in chosen if name == g.name] for g in groups}
 
@@ -179,13 +186,17 @@ def kept_trials(path: Path | None) -> dict[str, tuple[bool, int, float]]:
 
 
 def results(
-    group: Group, chosen: list[Change], asked: argparse.Namespace, ends: float
+    group: Group,
+    chosen: list[Change],
+    known: dict[str, str],
+    asked: argparse.Namespace,
+    ends: float,
 ) -> Iterator[Trial]:
     """What came of a group's changes until time is up; it is kept for the next run.
 
     What is known to change nothing is not tried.
     """
-    before, known = kept_trials(asked.kept), equivalent_changes()
+    before = kept_trials(asked.kept)
     left = []
     for change in chosen:
         if change.key in before:
@@ -270,7 +281,7 @@ def main() -> None:
         group = next(g for g in groups if g.name == name)
         wanted = [c for c in chosen if asked.module in c.module]
         trials[name] = []
-        for trial in results(group, wanted, asked, ends):
+        for trial in results(group, wanted, known, asked, ends):
             trials[name].append(trial)
             if not trial.noticed and not is_equivalent(trial.change.key, known):
                 line = f"{trial.change.line}, {trial.tests} tests"

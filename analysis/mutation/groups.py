@@ -73,6 +73,8 @@ GROUPS: Final = (
             "tests/geometry/test_closed_meshes.py",
             "tests/geometry/test_mesh_parts.py",
             "tests/geometry/test_winding.py",
+            "tests/certificate_checker/test_checker_arm_forgeries.py",
+            "tests/certificate_checker/test_checker_robots.py",
             "tests/robots/test_moving_beside_robots.py",
             "tests/robots/test_robot_first_contact.py",
             "tests/robots/test_two_robots.py",

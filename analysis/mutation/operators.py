@@ -114,7 +114,8 @@ def _other_calls(node: ast.Call) -> Iterator[ast.AST]:
         elif isinstance(changed.func, ast.Attribute):
             changed.func.attr = NAMES[name]
         yield changed
-    if len(node.args) > 1 and name not in EITHER_WAY:
+    same = name in EITHER_WAY or (name == "clip" and len(node.args) == 3)
+    if len(node.args) > 1 and not same:
         first, second = node.args[:2]
         if not isinstance(first, ast.Starred) and not isinstance(second, ast.Starred):
             changed = copy.deepcopy(node)

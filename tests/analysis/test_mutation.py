@@ -5,10 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from analysis.mutation.__main__ import gone  # noqa: E402
+from analysis.mutation import __main__ as program  # noqa: E402
 from analysis.mutation.changes import Change, changes, uses  # noqa: E402
 from analysis.mutation.coverage_map import Asked, CoverageMap, coverage_map  # noqa: E402
 from analysis.mutation.trial import Task  # noqa: E402
@@ -108,13 +110,26 @@ def test_changes_alike_in_one_function_are_told_apart(tmp_path: Path) -> None:
     ]
 
 
-def test_what_is_listed_and_gone_is_told(tmp_path: Path) -> None:
-    (tmp_path / "module.py").write_text("def one(x):\n    return x[1] + x[1]\n")
-    every, key = changes(tmp_path, "module.py"), "module.py:one: 1 -> 2"
-    listed = [key, f"{key} (no. 2)", f"{key} (no. 3)", f"{key} (all)"]
-    lost = ["module.py:two: 1 -> 2", "vdsm_pin/moved.py:: 1 -> 2"]
-    known = dict.fromkeys([*listed, *lost, "vdsm_pin/text.py:: 1 -> 2"], "")
-    assert gone(every, known) == [f"{key} (no. 3)", *lost]
+def test_what_is_listed_of_another_line_than_stands_there_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A line more above gives the number of one change to another."""
+    (tmp_path / "module.py").write_text(
+        "def one(x):\n    x[1] = 0\n    return x[1] | x[1]\n"
+    )
+    key = "module.py:one: 1 -> 2"
+    good = [f"{key} || r || x[1] = 0", f"{key} (no. 3) || s || return x[1] | x[1]"]
+    bad = [f"{key} (no. 2) || t || x[1] = 0", f"{key} (no. 4) || u || x[1] = 0"]
+    bad += ["gone.py:: 1 -> 2 || v || x", "module.py:two: 1 -> 2 (all) || w"]
+    words = ["# remark", *good, *bad, f"{key} (all) || of every one"]
+    (tmp_path / "list.txt").write_text("\n".join(words) + "\n")
+    monkeypatch.setattr(program, "EQUIVALENT", tmp_path / "list.txt")
+    monkeypatch.setattr(program, "ROOT", tmp_path)
+    program._lines_of.cache_clear()
+    reasons = {key: "r", f"{key} (no. 3)": "s", f"{key} (all)": "of every one"}
+    assert program.equivalent_changes() == reasons
+    told = [f"no such change: {one.partition(' || ')[0]}" for one in bad]
+    assert capsys.readouterr().out.splitlines() == told
 
 
 def test_text_and_annotations_stay(tmp_path: Path) -> None:

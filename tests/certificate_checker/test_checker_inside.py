@@ -300,6 +300,14 @@ def test_tetrahedra_of_which_a_ray_meets_an_edge_are_wound_round_exactly() -> No
     assert (counts > 5).all()
 
 
+def test_a_cavity_in_a_body_that_is_written_twice_is_none() -> None:
+    """As written the mesh closes and winds 2 - 1 times round the middle."""
+    thrice = np.concatenate([cube(6), cube(6), cube(5, sense=-1)])
+    assert Surface(thrice).not_outside([0.1, 0.2, 0.3], 0.01) == "it is inside"
+    twice = np.concatenate([thrice, cube(5, sense=-1)])
+    assert Surface(twice).not_outside([0.1, 0.2, 0.3], 0.01) == ""
+
+
 def test_zeros_of_both_signs_are_one_place() -> None:
     corners = BOX + 1.0  # from 0 to 2
     corners[::2][corners[::2] == 0.0] = -0.0

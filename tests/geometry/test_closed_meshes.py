@@ -81,6 +81,30 @@ def test_a_body_turned_inwards_within_another_is_a_cavity() -> None:
     assert where(box(6), inwards(box(5)), point=wall).side is Side.INSIDE
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_point_near_a_tip_is_inside_wherever_the_tip_stands_in_its_faces(
+    axis: int, sense: float
+) -> None:
+    """The box around a mesh is that of all corners of its triangles."""
+    tip, base = np.zeros(3), np.array([[1.0, 1, 1], [2, 1, 1], [1, 2, 1], [1, 1, 2]])
+    tip[axis] = -9.0
+    corners = np.array([tip, *(base[k] for k in (*range(4),) if k != axis + 1)])
+    for turned in range(3):
+        faces = [np.roll([0, i, j], turned) for i, j in ((1, 2), (2, 3), (3, 1))]
+        solid = sense * corners[np.array([*faces, [3, 2, 1]])]
+        near = sense * (0.9 * tip + 0.1 * corners[1:].mean(axis=0))
+        assert where(solid, point=near).side is Side.INSIDE
+        assert where(solid, point=1.2 * sense * tip).side is Side.OUTSIDE
+
+
+def test_a_cavity_in_a_body_that_is_written_twice_is_none() -> None:
+    """As written the mesh closes and winds 2 - 1 times round the middle."""
+    assert where(box(6), box(6), inwards(box(5))).side is Side.INSIDE
+    twice = box(6), box(6), inwards(box(5)), inwards(box(5))
+    assert where(*twice) == Location(Side.OUTSIDE)
+
+
 def test_bodies_turned_opposite_ways_that_overlap_leave_no_cavity() -> None:
     """The winding number is 0 there, as in a cavity."""
     found = where(box(5), inwards(box(6, (2, 0.5, 0.3))))

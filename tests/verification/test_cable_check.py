@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.cables import angles_from_cables
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.errors import InconsistentCables
 from vdsm_pin.problem.desired_path import DesiredPath
@@ -113,3 +114,18 @@ def test_the_row_whose_cables_determine_no_angles_is_named(
     check = check_cables(problem_for(HRM8), trajectory_of(still, still))
     assert (check.verdict, check.where) == (Verdict.REFUTED, "joint 3")
     assert (check.moment, check.worst) == (7.0, np.inf)
+
+
+def test_angles_that_are_none_are_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever makes them: what is not known to agree does not."""
+
+    def lost(arm: Manipulator, lengths: np.ndarray) -> list[np.ndarray]:
+        found = [np.array(one) for one in angles_from_cables(arm, lengths)]
+        found[1][3, 6] = np.nan
+        return found
+
+    monkeypatch.setattr(cable_check, "angles_from_cables", lost)
+    motion = trajectory_of(*np.full((2, 5, 8), 0.1))
+    row = check_cables(problem_for(HRM8), motion)
+    assert row.verdict is Verdict.REFUTED
+    assert (row.worst, row.where, row.moment) == (np.inf, "theta7", 3.0)

@@ -10,6 +10,7 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from vdsm_pin.certificate_checker.program import VERSION
+from vdsm_pin.certificate_writer import lines
 from vdsm_pin.certificate_writer.lines import PER_METRE, _counted
 from vdsm_pin.certificate_writer.pieces import (
     _triangles,
@@ -24,9 +25,11 @@ from vdsm_pin.certificate_writer.schema import (
     LinkPieces,
     Primitive,
 )
+from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.solids import BOX_CORNERS, Prism
+from vdsm_pin.time_limit import NO_LIMIT
 
 
 def test_claims_leave_the_checker_room_where_they_may() -> None:
@@ -112,6 +115,14 @@ def test_prisms_of_several_pieces_are_told_by_them() -> None:
         assert sum(areas) in (0.0, pytest.approx(_area(prism.polygon)))
 
 
+def test_pieces_are_told_that_are_counted_in_another_order_than_the_file_has() -> None:
+    solids: Any = [SimpleNamespace(name="sorted"), SimpleNamespace(name="plain")]
+    order, first = np.array([0, 1, 1, 0, 2, 0, 1, 2]), np.array([0, 2, 5, 8])
+    packed: Any = SimpleNamespace(order=order, first_piece=first)
+    told = pieces_of_obstacles([(1, solids[0]), (2, solids[1])], packed)
+    assert told == {"sorted": [1, 0, 2]}
+
+
 def _area(corners: np.ndarray) -> float:
     """Of a polygon, above 0 where it runs anticlockwise."""
     x, y = corners.T
@@ -171,3 +182,18 @@ def test_a_header_is_of_the_version_that_the_checker_reads() -> None:
     version = HeaderLine.model_fields["vdsm_certificate"]
     (read,) = get_args(version.annotation)
     assert version.default == read == VERSION
+
+
+@pytest.mark.parametrize("pair", [0, 3])
+def test_a_proof_that_is_not_found_again_is_told(
+    pair: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lines, "new_workspace", lambda *_: None)
+    monkeypatch.setattr(lines, "record", lambda *_: (0, 4, pair))
+    proof: Any = SimpleNamespace(
+        motion=SimpleNamespace(knots=np.zeros((9, 3))), task=None
+    )
+    with pytest.raises(
+        VerificationFailed, match=f"interval 4: the proof of pair {pair}"
+    ):
+        list(lines._lines(proof, NO_LIMIT))

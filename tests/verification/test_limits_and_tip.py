@@ -138,6 +138,38 @@ def test_the_deviation_bounds_the_tip_between_the_rows() -> None:
     assert 0.0 < worst <= bound <= 20.0 * worst
 
 
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_deviation_is_what_the_tip_is_off_by_and_the_rounding(rows: int) -> None:
+    """The straight arm moves along a line beside its path."""
+    x0, angles, off = np.array([0.0, 0.1])[:rows], np.zeros((rows, 8)), 3e-4
+    points = np.array([[ARM.total_length + x, off, 0.0] for x in x0])
+    path = DesiredPath(points[0], points, required_coverage=0.0)
+    problem = PlanningProblem("p", ARM, Scene(), path, 0.0, np.eye(4))
+    motion = Trajectory(np.ones(rows, bool), x0, x0, angles, angles)
+    found = check_tip(problem, motion).deviation
+    assert found == pytest.approx(off + TOLERANCES.arithmetic, abs=1e-14)
+
+
+def test_a_smooth_piece_draws_only_where_all_of_it_is_near() -> None:
+    """The straight arm's tip along its axis; it swings aside before and after row 1."""
+    x0, angles = np.array([0.0, 0.1, 0.2, 0.3]), np.zeros((4, 8))
+    ends = np.array([[ARM.total_length + x, 0.0, 0.0] for x in (0.0, 0.3)])
+    path = DesiredPath(ends[0], ends)
+    problem = PlanningProblem("p", ARM, Scene(), path, 0.0, np.eye(4))
+    for rate, share in ((0.0, 1.0), (0.05, 1.0 / 3.0)):
+        rates = np.zeros((4, 17))
+        rates[:, 0], rates[1, 1] = 0.1, rate
+        more = {"times": np.arange(4.0), "rates": rates}
+        motion = Trajectory(np.ones(4, bool), x0, x0, angles, angles, **more)
+        report = check_tip(problem, motion)
+        aside = 4.0 / 27.0 * rate * ARM.total_length  # of a Hermite piece
+        assert aside == 0.0 or aside > 2.0 * path.spacing
+        assert aside <= report.deviation <= aside + path.spacing
+        assert report.coverage == pytest.approx(share, abs=1e-9)
+        undrawn = [[0.0, 0.2]] if rate else np.zeros((0, 2))
+        np.testing.assert_allclose(report.undrawn, undrawn, atol=1e-9)
+
+
 def test_a_corner_skipped_between_rows_shows_in_the_deviation() -> None:
     problem, motion = drawing(4 * 40 + 1)
     keep = np.ones(motion.n_samples, bool)
