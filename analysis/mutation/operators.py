@@ -30,7 +30,7 @@ OPERATORS: Final[dict[type, tuple[type, ...]]] = {
 }
 NAMES: Final = {"min": "max", "max": "min", "all": "any", "any": "all"}
 EITHER_WAY: Final = frozenset(
-    "min max minimum maximum array_equal isinstance getattr suppress".split()
+    "min max fmin fmax minimum maximum array_equal isinstance getattr suppress".split()
 )
 """Calls that are the same, or none at all, with arguments in each other's place."""
 

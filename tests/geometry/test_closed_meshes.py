@@ -98,6 +98,27 @@ def test_a_point_near_a_tip_is_inside_wherever_the_tip_stands_in_its_faces(
         assert where(solid, point=1.2 * sense * tip).side is Side.OUTSIDE
 
 
+def test_seams_are_as_many_as_an_edge_lacks_partners_of_its_sense() -> None:
+    """Two cubes that meet at an edge, which both have forwards alone: it lacks two."""
+    ends, parts = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]), []
+    for k, centre in enumerate(((1.0, 1.0, 0.0), (-1.0, -1.0, 0.0))):
+        for triangle in box(1.0, centre):
+            sides = zip(triangle, np.roll(triangle, -1, axis=0), strict=True)
+            met = [i for i, (p, q) in enumerate(sides) if (p == ends[1]).all()
+                   and (q == ends[0]).all()]  # fmt: skip
+            if not met:
+                parts.append(triangle)
+                continue
+            a, b, c = np.roll(triangle, -met[0], axis=0)
+            middle = (a + (2 + k) * b) / (3 + k) + np.array([1e-5, 0.0, 0.0])
+            parts += [np.array([a, middle, c]), np.array([middle, b, c])]
+    assert len(parts) == 26
+    found = close_mesh(*Made(np.array(parts), [], []).indexed())
+    assert found.signed.all()
+    for centre in ([1.0, 1.1, 0.2], [-1.0, -1.1, 0.2]):
+        assert where(np.array(parts), point=np.array(centre)).side is Side.INSIDE
+
+
 def test_a_cavity_in_a_body_that_is_written_twice_is_none() -> None:
     """As written the mesh closes and winds 2 - 1 times round the middle."""
     assert where(box(6), box(6), inwards(box(5))).side is Side.INSIDE

@@ -1,16 +1,21 @@
 """Common balls of bodies that meet, none of bodies that do not."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Hulls, Piece
 from vdsm_pin.geometry.solids import BOX_CORNERS
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification import contacts
+from vdsm_pin.verification import clearances, contacts
 from vdsm_pin.verification.contacts import (
+    BESIDE,
     INNER,
     MOST_PIECES,
+    NEXT,
     Placed,
     common_ball,
     nearest_pieces,
@@ -257,3 +262,28 @@ def test_a_far_piece_among_many_is_found_wherever_the_body_stands() -> None:
         radius, centre = common_ball(Placed(balls, pose), Placed([DEEP]), point, 0.0)
         assert radius == pytest.approx(0.01 * PART - LOST, abs=1e-12)
         assert (centre == point).all()
+
+
+@pytest.mark.parametrize("off", [-0.0099, -0.004, 0.0, 0.0013, 0.0071])
+@pytest.mark.parametrize("length", [1.0, 0.25, 3.0])
+def test_the_moment_of_most_depth_beside_another_is_found(
+    off: float, length: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bodies that are deepest at a moment, to a share of the steps between moments."""
+    reach = min(1.0, length)
+    start, span = 5.0, np.array([5.0 - length / 4, 5.0 + 3 * length / 4])
+    deepest = start + off * reach
+    monkeypatch.setattr(clearances, "_placed", lambda _, __, at: (at, at))
+    monkeypatch.setattr(clearances, "seeming_depth", lambda at, *_: -abs(at - deepest))
+    motion: Any = None
+
+    def moments(about: np.ndarray, deadline: Deadline) -> list[float]:
+        asked = motion, 0, start, np.zeros(3), about, deadline
+        return list(clearances._moments(*asked))
+
+    *beside, last = moments(span, NO_LIMIT)
+    assert beside == pytest.approx((start + reach * BESIDE).clip(*span), abs=1e-12)
+    assert last == pytest.approx(deepest, abs=reach * NEXT * 2.0**-10)
+    still = np.array([start, start])
+    assert moments(still, NO_LIMIT) == [start] * 6
+    assert len(moments(span, Deadline(end=0.0))) == 5

@@ -1,5 +1,6 @@
 """What is drawn and in which order; oracle: cells of a path, counted one by one."""
 
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
@@ -135,6 +136,30 @@ def test_small_steps_back_add_up(closed: bool) -> None:
     assert (row.worst * CELLS, row.moment) == (CELLS, CELLS)
     (row,) = check_order(asked(closed, 1), motion(np.ones(2, bool), cells[:2]))
     assert row.verdict is Verdict.CERTIFIED
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_more_counts_as_drawn_than_is(seed: int) -> None:
+    """Of hundreds of stretches, whose sum rounds; by exact arithmetic."""
+    rng = np.random.default_rng([3, seed])
+    for _ in range(20):
+        n, ends = int(rng.integers(3, 600)), np.array([[3.0, 0, 0], [2.0, 0, 0]])
+        ends[1, 1] = rng.uniform()
+        path = DesiredPath(ends[0], ends)
+        stations = np.sort(rng.uniform(0.0, path.length, n))
+        on = rng.random(n) < 0.7
+        rows = Trajectory(on, stations, np.zeros(n), *np.zeros((2, n, 8)))
+        drawn = sum(
+            Fraction(b) - Fraction(a)
+            for (a, b), one, other in zip(
+                pairwise(stations.tolist()), on, on[1:], strict=False
+            )
+            if one and other
+        )
+        share, _ = coverage(path, rows)
+        exact = drawn / Fraction(path.length)
+        assert Fraction(share) <= exact
+        assert exact - Fraction(share) < 1e-12
 
 
 def test_a_path_of_one_point_is_drawn_by_any_row_there() -> None:
