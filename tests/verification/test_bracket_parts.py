@@ -596,6 +596,13 @@ def test_contacts_and_counterexamples_stand_in_the_row_of_their_kind() -> None:
     )
     _, links = rows((unknown,))
     assert links.where.endswith("first too close at waypoint 1.125: link 1 and link 4")
+    between = FirstContact(pairs[0], 2.3456, True, last=7.2504, intervals=5,
+                           stretches=1, time=1.0009, last_time=4.5001)  # fmt: skip
+    near, _ = rows((between,))
+    assert near.where.endswith(
+        "first too close at waypoint 2.345 (1.000 s); "
+        "last at waypoint 7.251 (4.501 s); 5 intervals"
+    )
     for nominal, words in ((True, "; the nominal motion is clear"), (False, "")):
         near, links = rows((), (found,), nominal)
         assert near.verdict is links.verdict is Verdict.REFUTED

@@ -4,7 +4,6 @@ import csv
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Final, TypeAlias
 
@@ -20,7 +19,7 @@ from vdsm_pin.report.words import (
     mean_count,
     outcome,
     percent,
-    quantity,
+    survived,
     term,
 )
 from vdsm_pin.text import printable
@@ -61,7 +60,7 @@ class Change:
 _MEASURES: Final[tuple[tuple[str, Text, float], ...]] = (
     ("min_clearance_lower_m", at_least, 1.0),
     ("coverage", percent, 1.0),
-    ("max_joint_error_rad", partial(quantity, unit="rad"), 1.0),
+    ("max_joint_error_rad", survived, 1.0),
     ("changed_angles_mean_on_path", mean_count, -1.0),
 )
 """Numbers of a row, how people read them, and the sign of a change that is better."""

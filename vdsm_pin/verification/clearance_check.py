@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isnan, nan
+from math import ceil, floor, isnan, nan
 from typing import Final
 
 import numpy as np
@@ -149,11 +149,11 @@ def _first(row: Check, contact: FirstContact) -> Check:
     """The row with the beginning of what it names at its worst."""
     found = "first too close" if contact.clear_before else "first found too close"
     pair = f"{contact.pair.own} and {contact.pair.label}"
-    moment = _told(contact.moment, contact.time)
+    moment = _told(contact.moment, contact.time, floor)
     named = "" if row.where == pair else f": {pair}"
     where = f"{row.where}; {found} at waypoint {moment}{named}"
     if contact.intervals:
-        last = _told(contact.last, contact.last_time)
+        last = _told(contact.last, contact.last_time, ceil)
         runs = "" if contact.stretches == 1 else f" in {contact.stretches} stretches"
         many = (
             "1 interval" if contact.intervals == 1 else f"{contact.intervals} intervals"
@@ -169,10 +169,17 @@ def _first(row: Check, contact: FirstContact) -> Check:
     )
 
 
-def _told(moment: float, time: float) -> str:
-    """A moment in waypoints, and its time where that is known."""
-    text = f"{moment:.3f}".rstrip("0").rstrip(".")
-    return text if isnan(time) else f"{text} ({time:.3f} s)"
+def _told(moment: float, time: float, whole: Callable[[float], int]) -> str:
+    """A moment in waypoints, and its time where that is known.
+
+    Rounded down where the motion is clear before it, up where it is clear after it.
+    """
+    text = _thousandths(moment, whole).rstrip("0").rstrip(".")
+    return text if isnan(time) else f"{text} ({_thousandths(time, whole)} s)"
+
+
+def _thousandths(value: float, whole: Callable[[float], int]) -> str:
+    return f"{whole(round(1e3 * value, 6)) / 1e3:.3f}"
 
 
 def _refuted_by(row: Check, found: Counterexample, *, nominal: bool) -> Check:
