@@ -14,14 +14,31 @@ from watched_pages import NEEDS_CHROMIUM, Watched, pixels
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import NoPlanFound, Reached
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.charts import packed
 from vdsm_pin.report.facts import verification_file
-from vdsm_pin.report.html import write_no_plan, write_report
+from vdsm_pin.report.html import view_page, write_no_plan, write_report
 
 pytestmark = NEEDS_CHROMIUM
 
 TURNED = np.array([[0.0, -1, 0, 5], [1, 0, 0, -2], [0, 0, 1, 0.5], [0, 0, 0, 1]])
+CART = """vdsm_problem: 1
+name: cart
+length_unit: mm
+manipulator:
+  link_lengths: [300, 300, 300, 300]
+  link_radius: 40
+  max_link_angle_deg: 45
+  max_joint_angle_deg: 45
+  feed: {length: 800, radius: 40}
+obstacles:
+  - {name: cart, shape: box, center: [0, 0, 0], size: [200, 200, 200],
+     motion: {times_s: [0, 9], positions: [[700, -300, 0], [700, -1500, 0]]}}
+required_clearance: 10
+"""
 SEEN = "points => points.map((one) => vdsm.view.overlay.seen(one))"
 
 
@@ -362,6 +379,28 @@ def test_a_page_without_a_plan_shows_where_the_search_ended(
     assert watched.errors == []
     assert len(watched.requests) == 1
     page.close()
+
+
+def test_the_first_look_has_room_for_what_moves_and_for_the_feed(
+    browser: Any, tmp_path: Path
+) -> None:
+    file = tmp_path / "cart.yaml"
+    file.write_text(CART, encoding="utf-8")
+    problem, still = read_problem(file), np.zeros((3, 4))
+    times = np.array([0.0, 5.0, 9.0])
+    motion = Trajectory(
+        np.zeros(3, dtype=np.bool_), np.zeros(3), np.zeros(3), still, still, times=times
+    )
+    page = tmp_path / "view.html"
+    page.write_text(view_page(ArmDrawing(problem, motion)), encoding="utf-8")
+    watched = Watched(browser, page.as_uri())
+    watched.page.wait_for_function("window.vdsm && window.vdsm.view")
+    ends = [[0.7, -1.5, 0.0], [0.7, -0.3, 0.0], [-0.8, 0.0, 0.0], [1.2, 0.0, 0.0]]
+    seen = np.array(watched.page.evaluate(SEEN, ends))
+    box = watched.page.locator("#view").bounding_box()
+    assert (seen > 0).all()
+    assert (seen < [box["width"], box["height"]]).all()
+    assert watched.errors == []
 
 
 def test_a_scene_without_obstacles_and_a_motion_of_one_row_have_a_page(

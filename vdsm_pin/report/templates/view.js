@@ -7,6 +7,8 @@ const GHOST = 0.5; // and an arm with errors
 const GREY = 0x8a94a6;
 const MARKED = { short: 0xe03131, kept: 0x2f8ae5 }; // the two that come near each other
 const WHOLE = 1.6; // times the motion's size: what is larger is not shown whole
+const WIDE = 2.2; // the same of what moves
+const SEEN_AT = 32; // moments at which what moves has to fit, but one
 const DUE = 1.5; // waypoints around its moment during which a gap is shown
 
 class ArmView {
@@ -87,22 +89,30 @@ class ArmView {
       this.root.add(body);
       return body;
     });
-    this.moveObstacles(this.motion.time);
     this.stretchBox();
   }
 
-  // Let the views show what stands around the motion, but not all of a long pipe.
+  // Let the views show what stands or moves around the motion, and what the arm carries,
+  // but not all of a long pipe.
   stretchBox() {
-    const { Box3, Vector3 } = this.three;
+    const { Box3 } = this.three;
     const reach = longest(this.box);
     const near = this.box.clone().expandByScalar(0.12 * reach);
-    for (const { geometry, matrix } of this.obstacles) {
-      geometry.computeBoundingBox();
+    const show = ({ geometry, matrix }, whole) => {
+      if (!geometry.boundingBox) geometry.computeBoundingBox();
       const part = new Box3().copy(geometry.boundingBox).applyMatrix4(matrix);
-      if (longest(near.clone().union(part)) > WHOLE * reach) part.intersect(near);
-      if (part.isEmpty()) continue;
+      if (longest(near.clone().union(part)) > whole * reach) part.intersect(near);
+      if (part.isEmpty()) return;
       this.box.union(part);
       this.spots.push(...boxCorners(part));
+    };
+    const moving = this.obstacles.filter((body) => body.moves);
+    for (const body of this.obstacles) if (!body.moves) show(body, WHOLE);
+    for (let k = 0; k <= SEEN_AT; k++) {
+      const moment = (k / SEEN_AT) * this.motion.end;
+      this.moveObstacles(moment);
+      this.arm.pose(...this.motion.poses(moment));
+      for (const body of [...moving, ...(this.arm.carried || [])]) show(body, WIDE);
     }
   }
 
