@@ -6,7 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from some_slow import few_of
 
+from vdsm_pin.planner.strategies import STRATEGIES
 from vdsm_pin.startup import OBJECTS, SETTINGS
 
 # Not pydantic: typer itself imports it where a command has parameters.
@@ -16,6 +18,7 @@ NOT_FOR_OBS1 = {
     *("numpy.ma", "asyncio", "concurrent.futures", "multiprocessing", "flint"),
     *("vdsm_pin.certificate_writer.certificate", "vdsm_pin.certificate_checker"),
 }
+NEEDED = {"paper": {"shapely"}}
 NOT_FOR_A_PROOF = {
     *("vdsm_pin.planner.fewest", "vdsm_pin.planner.paper", "vdsm_pin.refinement"),
 }
@@ -69,10 +72,16 @@ def verifying(folder: Path) -> tuple[str, ...]:
     return "verify", "paper/obs1", "--trajectory", trajectory, "--out", str(folder)
 
 
-def test_a_plan_imports_no_more_than_it_needs(folder: Path) -> None:
-    found = imported(run("plan", "paper/obs1", "--out", str(folder)))
-    assert "vdsm_pin.planner.fewest" in found
-    assert found.isdisjoint(NOT_FOR_OBS1)
+@pytest.mark.parametrize(
+    "strategy", few_of(sorted(STRATEGIES, key=("clearest", "sturdiest").count), 3)
+)
+def test_a_plan_imports_no_more_than_it_needs(
+    folder: Path, strategy: str, tmp_path: Path
+) -> None:
+    words = "plan", "paper/obs1", "--out", str(tmp_path), "--strategy", strategy
+    run(*words)  # compiles what is not there
+    found = imported(run(*words))
+    assert found.isdisjoint(NOT_FOR_OBS1 - NEEDED.get(strategy, set()))
 
 
 def test_a_verification_imports_no_more_than_it_needs(folder: Path) -> None:
