@@ -20,9 +20,9 @@ def test_what_stands_there_is_found() -> None:
     assert [one.number() for one in data["a"]["b"].items()] == [1.0, 2.5, 3.0]
     assert data["a"].keys() == ["b"]
     assert data.get("n").value == 7
-    for missing in (data.get("none", 3), data.get("x", 3), data["n"].get("x", 3)):
+    for missing in (data.get("none", 3), data.get("x", 3), data.get("x").get("y", 3)):
         assert missing.value == 3
-    assert data.get("x").value is None
+    assert data.get("x").value is data["n"].get("x").value is None
 
 
 @pytest.mark.parametrize(
@@ -31,6 +31,8 @@ def test_what_stands_there_is_found() -> None:
         (lambda data: data["n"]["x"], "f: n: is no mapping"),
         (lambda data: data["a"]["b"]["x"], "f: a.b: is no mapping"),
         (lambda data: data["a"]["x"], "f: a: has no 'x'"),
+        (lambda data: data["n"].get("x", 3), "f: n: is no mapping"),
+        (lambda data: data["a"]["b"].get("x", []), "f: a.b: is no mapping"),
         (lambda data: data["a"]["b"][3], "f: a.b: has no 3"),
         (lambda data: data["n"][0], "f: n: has no 0"),
         (lambda data: data["n"].items(), "f: n: is no list"),

@@ -1,7 +1,10 @@
 """Scenes of other programs: MoveIt's text, MuJoCo's worlds."""
 
+import copy
+import json
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -302,3 +305,130 @@ def test_meshes_of_a_planning_scene_in_another_unit_are_noted(
     assert isinstance(mesh, Mesh)
     assert len(mesh.notes) == noted
     assert all("is it in another unit?" in note for note in mesh.notes)
+
+
+def pose(*numbers: float) -> dict[str, Any]:
+    return {"position": list(numbers[:3]), "orientation": list(numbers[3:])}
+
+
+def of_shape(kind: str | int, *sizes: float) -> dict[str, Any]:
+    return {"type": kind, "dimensions": list(sizes)}
+
+
+TURNED = 0.6, 0.0, 0.0, 0.8
+WORLDLY: dict[str, Any] = {"header": {"frame_id": "world"}}
+OBJECTS: list[dict[str, Any]] = [
+    {"id": "can", **WORLDLY, "pose": pose(1, 2, 3, *TURNED), "primitives": [
+        of_shape("cylinder", 0.2, 0.05), of_shape(2, 0.1)],
+     "primitive_poses": [pose(0, 0, 0.5, 0, 0.6, 0, 0.8), pose(0, 0, 1, 0, 0, 0, 1)]},
+    {"id": "shelf", **WORLDLY,
+     "primitives": [of_shape(1, 0.1, 0.2, 0.3)],
+     "primitive_poses": [pose(-1, 0.5, 0.25, 0, 0, 0.6, -0.8)]},
+    {"id": "slab", **WORLDLY, "primitives": [of_shape("box", 1, 2, 0.1)],
+     "primitive_poses": [pose(0, 0, -1, 0, 0, 0, 1)]},
+]  # fmt: skip
+
+
+def planning_scene(**more: Any) -> dict[str, Any]:
+    return copy.deepcopy({"world": {"collision_objects": OBJECTS}, **more})
+
+
+def placement(stated: Any) -> np.ndarray:
+    """T of a pose, by Rodrigues' rule, where its numbers are named or listed."""
+    found = np.eye(4)
+    if stated is None:
+        return found
+    place, turn = stated.get("position"), stated.get("orientation")
+    x = [place[k] for k in "xyz"] if isinstance(place, dict) else place or [0, 0, 0]
+    q = [turn[k] for k in "xyzw"] if isinstance(turn, dict) else turn or [0, 0, 0, 1]
+    found[:3, 3] = x
+    q = np.array(q) / np.linalg.norm(q)
+    for k, e in enumerate(np.eye(3)):
+        side = np.cross(q[:3], e)
+        found[:3, k] = e + 2.0 * (q[3] * side + np.cross(q[:3], side))
+    return found
+
+
+def expected(data: dict[str, Any]) -> list[tuple[Any, ...]]:
+    """Name, kind, T and sizes of every solid, of plain numbers and mappings."""
+    solids: list[tuple[Any, ...]] = []
+    for thing in data["world"]["collision_objects"]:
+        base = placement(thing.get("pose"))
+        both = [*zip(thing["primitives"], thing["primitive_poses"], strict=True)]
+        for k, (shape, at) in enumerate(both, 1):
+            name = thing["id"] if len(both) == 1 else f"{thing['id']}/{k}"
+            kind = ("box", "sphere", "cylinder")[shape["type"] - 1] if isinstance(
+                shape["type"], int) else shape["type"]  # fmt: skip
+            sizes = [float(x) for x in shape["dimensions"]]
+            solids.append((name, kind, base @ placement(at), sizes))
+    return solids
+
+
+def assert_as_expected(found: Any, name: str, kind: str, pose: Any, sizes: Any) -> None:
+    assert (found.name, type(found).__name__.lower()) == (name, kind)
+    np.testing.assert_allclose(found.centre, pose[:3, 3], atol=1e-9)
+    if isinstance(found, Box):
+        np.testing.assert_allclose(found.rotation, pose[:3, :3], atol=1e-9)
+        np.testing.assert_allclose(2.0 * found.half_size, sizes)
+    elif isinstance(found, Cylinder):
+        np.testing.assert_allclose(found.axis, pose[:3, 2], atol=1e-9)
+        assert [2.0 * found.half_length, found.radius] == pytest.approx(sizes)
+    else:
+        assert [found.radius] == pytest.approx(sizes)
+
+
+def test_planning_scenes_with_one_thing_changed_are_refused_or_read_as_stated(
+    tmp_path: Path,
+) -> None:
+    """Another number, nothing, a list for a mapping, a mapping for a list, any word."""
+    rng, read = np.random.default_rng(7), 0
+    odd = None, -1, 0, 5.5, "x", "", [], {}, True, [1, 2, 3], {"x": 1}, 1e13, [[0] * 7]
+    for k in range(400):
+        data = planning_scene()
+        holder, key = data["world"], "collision_objects"
+        for _ in range(int(rng.integers(2, 7))):
+            inner = holder[key]
+            if not isinstance(inner, dict | list) or not inner:
+                break
+            holder = inner
+            some = [*inner] if isinstance(inner, dict) else [*range(len(inner))]
+            key = some[int(rng.integers(len(some)))]
+        value = holder[key]
+        if k % 3 == 0 and type(value) in (int, float):
+            holder[key] = value * float(rng.choice([-1, 1.5, 1 + 1e-9]))
+        elif k % 3 == 1 and isinstance(value, list) and len(value) in (3, 4):
+            holder[key] = dict(zip("xyzw", value, strict=False))
+        else:
+            holder[key] = odd[int(rng.integers(len(odd)))]
+        file = write(tmp_path, "s.yaml", json.dumps(data))
+        try:
+            scene = read_scene(file, 1.0)
+        except InvalidFile as error:
+            assert len(str(error).splitlines()) == 1
+            continue
+        read += 1
+        told = zip(scene.obstacles, expected(data), strict=True)
+        for found, solid in told:
+            assert_as_expected(found, *solid)
+    assert 50 < read < 300
+
+
+@pytest.mark.parametrize(
+    ("frame", "shift", "good"),
+    [("world", [0, 0, 0], True), ("world", [0, 0, 1e-3], False), ("", [1, 0, 0], True),
+     ("camera", [1, 0, 0], True)],
+)  # fmt: skip
+def test_objects_in_a_frame_that_stands_elsewhere_are_refused(
+    tmp_path: Path, frame: str, shift: list[float], good: bool
+) -> None:
+    """A PlanningScene tells where frames stand besides those of links."""
+    where = {"translation": shift, "rotation": [0, 0, 0, 1]}
+    data = planning_scene(
+        fixed_frame_transforms=[{"child_frame_id": frame, "transform": where}]
+    )
+    file = write(tmp_path, "s.yaml", json.dumps(data))
+    if good:
+        assert len(read_scene(file, 1.0).obstacles) == 4
+        return
+    with pytest.raises(InvalidFile, match="'world', expected that of the root link"):
+        read_scene(file, 1.0)

@@ -40,10 +40,19 @@ class Place:
             raise self.invalid(problem) from None
 
     def get(self, key: str, default: Any = None) -> "Place":
-        """What stands under a key, or a default."""
-        has = isinstance(self.value, dict) and self.value.get(key) is not None
-        value = self.value[key] if has else default
-        return Place(self.document, (*self.at, key), value)
+        """What stands under a key, or a default where nothing does.
+
+        Raises:
+            InvalidFile: If this is no mapping, for which a default would stand.
+        """
+        known = isinstance(self.value, dict)
+        if not known and default is not None and self.value is not None:
+            problem = "is no mapping"
+            raise self.invalid(problem)
+        found = self.value.get(key) if known else None
+        return Place(
+            self.document, (*self.at, key), default if found is None else found
+        )
 
     def items(self) -> list["Place"]:
         """Of a list.

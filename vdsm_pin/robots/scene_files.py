@@ -107,7 +107,7 @@ def _moveit(document: YamlDocument, links: Collection[str], robot_size: float) -
         raise whole["is_diff"].invalid(problem)
     found: list[Obstacle] = []
     things = whole["world"].get("collision_objects", []).items()
-    _check_frames(things, links)
+    _check_frames(things, links, whole.get("fixed_frame_transforms", []).items())
     for thing in things:
         found += [_sized(one, robot_size) for one in _solids(thing)]
     with whole["world"].naming():
@@ -127,14 +127,29 @@ def _sized(obstacle: Obstacle, robot_size: float) -> Obstacle:
     return replace(obstacle, notes=(*obstacle.notes, note))
 
 
-def _check_frames(things: Sequence[Place], links: Collection[str]) -> None:
-    """Refuse frames that differ or are other links': all stand in the root link's."""
+def _check_frames(
+    things: Sequence[Place], links: Collection[str], placed: Sequence[Place]
+) -> None:
+    """Refuse frames that differ, stand elsewhere or are other links'.
+
+    All objects stand in the root link's.
+    """
+    names = (one.get("child_frame_id", "") for one in placed if _stands_aside(one))
+    elsewhere = {*links, *(str(name.value).lstrip("/") for name in names)} - {""}
     frames = [(one, one.get("header", {}).get("frame_id", "")) for one in things]
     for thing, frame in frames:
         one = str(frame.value)
-        if frame.value != frames[0][1].value or one.lstrip("/") in links:
+        if frame.value != frames[0][1].value or one.lstrip("/") in elsewhere:
             problem = f"is in the frame {one[:60]!r}, expected that of the root link"
             raise thing.invalid(problem)
+
+
+def _stands_aside(placed: Place) -> bool:
+    """Whether a TransformStamped shifts or turns."""
+    transform = placed.get("transform", {})
+    shift = _named(transform.get("translation", [0, 0, 0]), "xyz")
+    turn = _named(transform.get("rotation", [0, 0, 0, 1]), "xyzw")
+    return bool(shift.any() or turn[:3].any())
 
 
 def _solids(thing: Place) -> list[Obstacle]:
@@ -165,7 +180,7 @@ def _solids(thing: Place) -> list[Obstacle]:
 def _primitive(shape: Place, name: str, placement: FloatArray) -> Obstacle:
     kinds = {1: "box", 2: "sphere", 3: "cylinder"}
     kind = shape["type"].value
-    kind = kinds.get(kind, kind) if not isinstance(kind, bool) else kind
+    kind = kinds.get(kind, kind) if type(kind) in (int, float) else kind
     turn, centre = placement[:3, :3], placement[:3, 3]
     sizes = shape["dimensions"]
     match kind:
