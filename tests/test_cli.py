@@ -373,6 +373,9 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
     file.write_text("x")
     text = folder / "text.yaml"
     text.write_text("just words")
+    named = folder.parent / "made" / "problem.yaml"
+    named.parent.mkdir()
+    named.write_text("just words")
     short = folder / "short.csv"
     short.write_text("\n".join(rows.read_text().splitlines()[:3]).rpartition(",")[0])
     out = folder / "out"
@@ -381,6 +384,9 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
         "absent.yaml": ["plan", folder / "absent.yaml", "--out", out],
         "built-in problems: paper/free": ["plan", "paper/obs9", "--out", out],
         "expected a file": ["plan", folder, "--out", out],
+        f"try {named}": ["plan", named.parent, "--out", out],
+        "trajectory.csv: ends in none of .html": ["view", good, "--html", rows],
+        "trajectory.csv: ends in none of .pdf": [*verify, rows, "--pdf", rows],
         "text.yaml": ["plan", text, "--out", out],
         "file: is a file, expected a folder": ["plan", good, "--out", file],
         "unknown strategy": ["plan", good, "--out", out, "--strategy", "luck"],

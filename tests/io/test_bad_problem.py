@@ -340,6 +340,7 @@ NOT_PLAIN_YAML = [
     (b"vdsm_problem: 1\nname: \xff\n", "line 2: is not UTF-8 text (byte 0xff)"),
     ("vdsm_problem: 1\n".encode("utf-16"), "line 1: is not UTF-8 text (byte 0xff)"),
     (b"a: \x01\n", "is not YAML: unacceptable character"),
+    (b"a:\n\tb: 1\n", "line 2: is not YAML: has a tab, expected spaces"),
     (b"a: [1, 2\n", "is not YAML: did not find expected ',' or ']'"),
     (b"a: 1\n---\nb: 2\n", "line 2: a second document starts here"),
     (b"a: 1\n---\n---\nb: 2\n", "line 3: a second document starts here"),

@@ -73,12 +73,9 @@ def export(order: ExportOrder) -> None:
 
 def _check(order: ExportOrder) -> None:
     """Refuse what cannot be done before any work is."""
-    if order.out.suffix.lower() not in ENDINGS:
-        message = f"{order.out}: ends in none of {', '.join(ENDINGS)}"
-        raise InvalidInput(message)
+    check_output_file(order.out, *ENDINGS)
     if order.out.suffix.lower() == ".mp4":
         find_encoder()
-    check_output_file(order.out)
     motion = () if order.trajectory is None else (order.trajectory,)
     check_kept([order.out], [*order.problem.files, *motion])
 

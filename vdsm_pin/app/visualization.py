@@ -44,7 +44,7 @@ def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
     Raises:
         InvalidInput: If a file is bad or the page cannot be written.
     """
-    check_output_file(path)
+    check_output_file(path, ".html", ".htm")
     asked = read_problem_or_cell(problem)
     motion = () if trajectory is None else (trajectory,)
     check_kept([path], [*asked.files, *motion])
@@ -77,7 +77,8 @@ class ViewServer(ThreadingHTTPServer):
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as error:
-            message = f"port {port} cannot be used: {error.strerror or error}"
+            reason = error.strerror or error
+            message = f"port {port} cannot be used: {reason}; 0 takes a free one"
             raise InvalidInput(message) from error
 
     @property

@@ -255,7 +255,7 @@ def _check_outputs(order: VerifyOrder) -> None:
     check_output_folder(order.folder)
     alone = [file for file in (order.certificate, order.pdf) if file is not None]
     for file in alone:
-        check_output_file(file)
+        check_output_file(file, *([".pdf"] if file is order.pdf else []))
     outputs = [*(order.folder / name for name in JUDGED), *alone]
     beside = order.trajectory.parent / PLAN
     check_kept(outputs, [*order.problem.files, order.trajectory, beside])

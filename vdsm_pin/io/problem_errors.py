@@ -120,7 +120,8 @@ def _problem(details: ErrorDetails, at: Location, model: type[FileModel]) -> str
     match kind:
         case "missing":
             hint = _fields(_models(loc[:-1], model))[str(loc[-1])].description
-            return f"is missing; expected: {hint}" if hint else "is missing"
+            value = "a value " if hint and hint.startswith("[") else ""  # unit alone
+            return f"is missing; expected: {value}{hint}" if hint else "is missing"
         case "extra_forbidden":
             known = ", ".join(_fields(_models(loc[:-1], model)))
             return f"is not a known key; known: {known}"

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -117,8 +118,11 @@ def find_problem(name_or_path: str | Path) -> Path:
     try:
         check_is_file(path)
     except InvalidFile as error:
-        known = ", ".join(built_in_names())
-        problem = f"{error.problem}; built-in problems: {known}"
+        hint = f"built-in problems: {', '.join(built_in_names())}"
+        with suppress(OSError, ValueError):
+            inside = path / "problem.yaml"
+            hint = f"try {inside}" if inside.is_file() else hint
+        problem = f"{error.problem}; {hint}"
         raise InvalidFile(file=name or "''", problem=problem) from None
     return path
 

@@ -118,6 +118,9 @@ def read_yaml(text: str, *, file: object) -> YamlDocument:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}" if mark else ""
         problem = f"is not YAML: {error.problem or error.context}"
+        lines = plain.split("\n")[mark.line :] if mark else []
+        if mark and lines and lines[0][mark.column :].startswith("\t"):
+            problem = "is not YAML: has a tab, expected spaces"
         raise InvalidFile(file=file, where=where, problem=problem) from None
     except yaml.YAMLError as error:
         problem = f"is not YAML: {' '.join(str(error).split())}"
