@@ -799,9 +799,8 @@ def test_no_ball_is_looked_for_when_time_is_over() -> None:
     )
     path = Path(np.zeros((2, 1)))
     motion: Any = SimpleNamespace(asked=None, path=path, span=np.array([0.0, 1.0]))
-    pairs, over = np.arange(2), Deadline.after(0.0)
-    found = clearances.with_balls(motion, least, pairs, deadline=over)
+    found = clearances.with_depths(motion, least, deadline=Deadline.after(0.0))
     for name in (one.name for one in fields(least)):
         np.testing.assert_array_equal(getattr(found, name), getattr(least, name))
     with pytest.raises(AttributeError):  # it asks for poses otherwise
-        clearances.with_balls(motion, least, pairs)
+        clearances.with_depths(motion, least)

@@ -9,12 +9,10 @@ import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
-from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.first_contact import (
     FINE_SHARE,
     LEAST_SHARE,
     FirstContact,
-    TooClose,
     first_contacts,
 )
 from vdsm_pin.verification.records import Pair
@@ -244,22 +242,3 @@ def test_what_no_stretch_refutes_is_no_contact() -> None:
 def test_a_single_row_is_one_interval() -> None:
     (found,) = Truth(0, [(1, 0.0, 0.0)]).found(noted=True)
     assert (found.moment, found.last, found.intervals, found.stretches) == (0, 0, 1, 1)
-
-
-def test_intervals_are_noted_for_each_kind_of_pair() -> None:
-    rng = np.random.default_rng(5)
-    sink, truth = TooClose(PAIRS, 12), np.zeros((2, 12), bool)
-    for _ in range(12):
-        first = int(rng.integers(0, 10))
-        numbers = rng.permutation(4)[: rng.integers(1, 5)] if rng.integers(2) else None
-        columns = np.arange(4) if numbers is None else numbers
-        verdict = rng.choice(
-            [CERTIFIED, UNDECIDED, REFUTED], (2, len(columns)), p=[0.6, 0.3, 0.1]
-        )
-        blank: Any = np.zeros(0)
-        sink(ClearanceChunk(first, blank, blank, blank, verdict, blank, blank, numbers))
-        for r, c in np.argwhere(verdict == REFUTED):
-            truth[int(OF_OBSTACLES[columns[c]]), first + r] = True
-        for kind in (False, True):
-            assert np.array_equal(sink.noted[kind], truth[int(kind)])
-    assert truth.any(axis=1).all()

@@ -43,6 +43,8 @@ def test_the_moment_at_which_a_wall_is_too_close(n: int, distance: float) -> Non
     assert found.moment == pytest.approx((distance - 0.01) * (n - 1), abs=2e-6)
     assert (found.pair.link, found.pair.obstacle) == (8, "wall")
     assert found.clear_before
+    assert (found.last, found.stretches) == (n - 1, 1)
+    assert found.intervals == n - 1 - int((distance - 0.01) * (n - 1))
     # An obstacle that may stand nearer by 20 mm is met that much earlier.
     box = ErrorBox(obstacle=0.02)
     proof = prove_clearance(problem, motion, box)

@@ -9,7 +9,7 @@ import pytest
 
 from vdsm_pin.geometry.winding import Location, Side
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.inside import Place, check_inside
+from vdsm_pin.verification.inside import LINKS_OUTSIDE, Place, check_inside
 from vdsm_pin.verification.records import (
     Check,
     Pair,
@@ -61,11 +61,10 @@ def test_the_row_of_meshes_counts_those_that_decide_it(
     sides: dict[str, Location], verdict: Verdict, bad: str
 ) -> None:
     """Of the first moment, where the arm is outside of them all or is not."""
-    asked: Any = SimpleNamespace(pair=lambda k: Pair(1, [*sides][k]))
+    asked: Any = SimpleNamespace(chain=0, pair=lambda k: Pair(1, [*sides][k]))
     places = {k: Place(one, np.zeros(3)) for k, one in enumerate(sides.values())}
-    (row,) = check_inside(asked, places, "bodies outside")
-    assert (row.name, row.verdict, row.count) == (
-        "bodies outside", verdict, len(sides))  # fmt: skip
+    (row,) = check_inside(asked, places)
+    assert (row.name, row.verdict, row.count) == (LINKS_OUTSIDE, verdict, len(sides))
     assert (row.worst, row.limit, row.unit) == (float(len(bad)), 0.0, "-")
     assert row.where == "; ".join(sides[name].words(name) for name in bad)
     assert [row.moment] == pytest.approx([0.0 if bad else nan], nan_ok=True)

@@ -44,6 +44,7 @@ class Proof:
         share: When in that interval, 0 to 1, shape (n_pairs,).
         points: Witnesses on the first and on the second body, in the world's frame,
             shape (n_pairs, 2, 3); [m].
+        counts: Intervals of it certified, refuted and undecided, (n_pairs, 3).
         in_time: Whether there was time for all; what is not judged is undecided.
         profile: Least lower and upper bounds by column in each bin of intervals, shape
             (2, n_columns, n_bins); [m].
@@ -57,6 +58,7 @@ class Proof:
     interval: IntArray
     share: FloatArray
     points: FloatArray
+    counts: IntArray
     in_time: bool
     profile: FloatArray
     stride: int
@@ -146,6 +148,7 @@ def summed(results: Results, plan: PartPlan, n: int, in_time: bool) -> Proof:
         interval=frozen(best[met, AT_UPPER], np.int64),
         share=frozen(best[met, TIME]),
         points=frozen(points),
+        counts=frozen(judged, np.int64),
         in_time=in_time,
         profile=frozen(results.profile),
         stride=results.stride,

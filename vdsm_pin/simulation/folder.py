@@ -21,10 +21,10 @@ from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
 from vdsm_pin.simulation.page import BAND_DEG, page
 from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
+from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.clearance_check import check_clearance
-from vdsm_pin.verification.enclosed import enclosed_least, pairs_inside
-from vdsm_pin.verification.inside import check_inside, located
+from vdsm_pin.verification.inside import located
+from vdsm_pin.verification.judgement import judge_clearance
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import combine
 
@@ -192,11 +192,11 @@ def cleared(
     """
     errors = problem.errors.widened(errors)
     proof = prove_clearance(problem, trajectory, errors)
-    asked, places = proof.motion.asked, located(proof.motion)
-    rows = [*check_clearance(problem, proof, ()), *check_inside(asked, places)]
-    verdict = combine(tuple(row.verdict for row in rows))
-    proved = enclosed_least(proof.least, pairs_inside(asked, places))
-    least = finite(float(proved.lower[asked.outer].min(initial=np.inf)))
+    known = proof, located(proof.motion), BestEffort()
+    found = judge_clearance(problem, trajectory, *known, contacts=False)
+    verdict = combine(tuple(row.verdict for row in found.checks))
+    lower = found.least.lower[proof.motion.asked.outer]
+    least = finite(float(lower.min(initial=np.inf)))
     return Cleared(verdict=verdict.value, min_clearance_m=least)
 
 

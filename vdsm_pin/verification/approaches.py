@@ -1,6 +1,6 @@
 """The pairs that come nearest in a motion."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import nan
 from typing import Final
@@ -12,9 +12,8 @@ from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.brackets import LeastClearances
-from vdsm_pin.verification.records import ClosestApproach, Pair, is_deepest
+from vdsm_pin.verification.records import ClosestApproach, Pair
 
 CLOSEST: Final = 10
 """Most pairs that are listed."""
@@ -23,27 +22,11 @@ CLOSEST: Final = 10
 def closest_approaches(
     problem: PlanningProblem,
     trajectory: Trajectory,
-    asked: Assembly,
-    least: LeastClearances,
+    nearest: Iterable[ClosestApproach],
 ) -> tuple[ClosestApproach, ...]:
-    """The pairs that come nearest, by their upper bounds; obstacles first.
-
-    Links keep near each other all the time, which is rarely news. The lower bound of
-    the nearest is narrowed; another may lie below it by the width of that bracket.
-
-    Args:
-        problem: Arm and scene.
-        trajectory: The motion.
-        asked: What is held apart.
-        least: What is proved of every pair, meshes as solids.
-    """
+    """The pairs that come nearest in a snake arm's motion, with places along links."""
     return tuple(
-        replace(
-            near,
-            station=_station(problem, trajectory, near),
-            deeper=is_deepest(near.upper, asked.ball(k)),
-        )
-        for k, near in nearest_pairs(asked.pairs, least).items()
+        replace(near, station=_station(problem, trajectory, near)) for near in nearest
     )
 
 
@@ -52,6 +35,8 @@ def nearest_pairs(
 ) -> dict[int, ClosestApproach]:
     """The pairs of least upper bounds by their numbers, obstacles first.
 
+    Links keep near each other all the time, which is rarely news. The lower bound of
+    the nearest is narrowed; another may lie below it by the width of that bracket.
     Under errors one that comes less near may be proved to keep less than any of these
     from its obstacle; then it takes the place of the last.
 

@@ -37,9 +37,8 @@ from vdsm_pin.verification.clearances import (
     in_rows,
     least_clearances,
     profile_of,
-    with_balls,
+    with_depths,
 )
-from vdsm_pin.verification.contacts import MEETING
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.moving import Knots
 from vdsm_pin.verification.records import Counterexample, Pair
@@ -49,9 +48,6 @@ CHUNK_VALUES: Final = 1_000_000
 
 CHUNK: Final = 4096
 """Most intervals between two chunks."""
-
-MOST_MEETINGS: Final = 32
-"""Pairs in which a ball in both is looked for."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +59,8 @@ class ClearanceProof:
         counts: Intervals certified, refuted and undecided, shape (n_pairs, 3); knots of
             what carries obstacles end intervals too.
         inner: The least clearances, in intervals of the path.
-        weakest: Of each pair the interval of the trajectory with its least lower bound,
-            shape (n_pairs,).
+        weakest: Of each pair the interval of the path with its least lower bound, shape
+            (n_pairs,).
         profile: Brackets along the motion.
         slices: Slices tried beyond one per interval and pair.
         late: Whether the time was over before all was judged.
@@ -98,19 +94,17 @@ class ClearanceProof:
         Raises:
             OutOfTime: If the time is over.
         """
-        return find_counterexamples(self.motion, self.least, self.weakest, deadline)
+        return find_counterexamples(self.motion, self.inner, self.weakest, deadline)
 
-    def with_meetings(self, deadline: Deadline = NO_LIMIT) -> "ClearanceProof":
-        """The same with pairs refuted of which a ball is proved to lie in both bodies.
+    def with_depths(self, deadline: Deadline = NO_LIMIT) -> "ClearanceProof":
+        """The same with what balls in both bodies of pairs prove.
 
         No depth is measured of bodies that nothing grows: where they meet their
         clearance is 0 at most, which refutes no required clearance of 0.
         """
-        inner, counts = self.inner, self.counts.copy()
-        near = (inner.verdict == UNDECIDED) & (inner.upper <= MEETING)
-        pairs = np.flatnonzero(near)[:MOST_MEETINGS]
-        found = with_balls(self.motion, inner, pairs, deadline=deadline)
-        lost = pairs[found.verdict[pairs] == REFUTED]
+        found = with_depths(self.motion, self.inner, deadline=deadline)
+        lost = (self.inner.verdict == UNDECIDED) & (found.verdict == REFUTED)
+        counts = self.counts.copy()
         counts[lost, REFUTED] += 1
         counts[lost, UNDECIDED] -= 1
         return replace(self, inner=found, counts=frozen(counts, np.int64))
@@ -189,59 +183,54 @@ def prove_clearance(
         The proof, its least brackets narrowed unless the time ended before.
     """
     motion = AskedMotion.of_arm(problem, trajectory, errors)
-    return prove_motion(problem, trajectory, motion, sinks, deadline, reach)
+    return prove_motion(motion, Budget(until=deadline.end), sinks, reach)
 
 
 def prove_motion(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
     motion: AskedMotion,
-    sinks: Sequence[ClearanceSink],
-    deadline: Deadline,
-    reach: float,
+    budget: Budget,
+    sinks: Sequence[ClearanceSink] = (),
+    reach: float = math.inf,
 ) -> ClearanceProof:
     """`prove_clearance` of what is asked already."""
-    proving = motion.proving(Budget(until=deadline.end))
+    asked, proving = motion.asked, motion.proving(budget)
     step("proving the clearance of %d pairs", motion.question.n_pairs)
     with watched(lambda: proving.share):
-        late = not proving.run()
-    results, knots, sent = proving.results, motion.knots, 0
-    told, n_links = motion.told(results, in_time=not late), problem.manipulator.n_links
-    if sinks:
-        sent = _send(problem, trajectory, motion, proving, sinks, reach)
+        in_time = proving.run()
+    told = motion.told(proving.results, in_time=in_time)
+    sent = _send(motion, proving, sinks, reach) if sinks else 0
+    n_links = max(asked.links, default=0)
     return ClearanceProof(
         motion=motion,
-        counts=frozen(results.counts, np.int64),
-        inner=least_clearances(motion.asked, told),
-        weakest=knots.interval(told.lower_interval),
-        profile=profile_of(results.profile, results.stride, knots, n_links),
-        slices=int(results.tally[SLICES]),
-        late=late,
+        counts=told.counts,
+        inner=least_clearances(asked, told),
+        weakest=told.lower_interval,
+        profile=profile_of(told.profile, told.stride, motion.knots, n_links),
+        slices=int(proving.results.tally[SLICES]),
+        late=not in_time,
         sent=sent,
     )
 
 
 def _send(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    motion: AskedMotion,
-    proving: Proving,
-    sinks: Sequence[ClearanceSink],
-    reach: float,
+    motion: AskedMotion, proving: Proving, sinks: Sequence[ClearanceSink], reach: float
 ) -> int:
-    """Sweep the near obstacles once more, closely and for the sinks.
+    """Sweep the near obstacles of a snake arm once more, closely and for the sinks.
 
     Returns:
         Number of intervals sent.
     """
-    asked, known, obstacles = motion.asked, proving.results, problem.scene.obstacles
+    asked, known, obstacles = (
+        motion.asked,
+        proving.results,
+        motion.asked.scene.obstacles,
+    )
     outer, obstacle = asked.outer, asked.table.one - len(asked.own)
     # numpy.unique imports numpy.ma, for which every process would wait.
     near = np.flatnonzero(np.bincount(obstacle[outer & (known.best[:, LOW] <= reach)]))
     pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)
     if near.size < len(obstacles):
-        some = problem.among(np.isin(np.arange(len(obstacles)), near))
-        motion = AskedMotion.of_arm(some, trajectory, motion.errors)
+        motion = motion.among(pairs)
         proving = motion.proving(proving.budget)
     length = CHUNK_VALUES // max(1, pairs.size) // BLOCK * BLOCK
     length = min(CHUNK, proving.n_intervals, max(BLOCK, length))

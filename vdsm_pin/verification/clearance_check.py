@@ -10,11 +10,9 @@ import numpy as np
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.any_problem import AnyProblem
-from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
-from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.brackets import LeastClearances
-from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import (
@@ -22,7 +20,6 @@ from vdsm_pin.verification.records import (
     Counterexample,
     Pair,
     Verdict,
-    is_deepest,
 )
 
 OBSTACLES: Final = "clearance from obstacles"
@@ -50,40 +47,6 @@ class Evidence:
     counterexamples: tuple[Counterexample, ...]
     nominal: bool
     contacts: tuple[FirstContact, ...]
-
-
-def check_clearance(
-    problem: PlanningProblem,
-    proof: ClearanceProof,
-    counterexamples: tuple[Counterexample, ...],
-    contacts: tuple[FirstContact, ...] = (),
-    deadline: Deadline = NO_LIMIT,
-    *,
-    nominal: bool = False,
-) -> tuple[Check, ...]:
-    """`clearance_checks` of an arm, which say what a mesh counts as.
-
-    Args:
-        problem: Required clearances.
-        proof: Of every motion within the error box.
-        counterexamples: Motions within it that refute what the proof left undecided.
-        contacts: Where the clearance is first lost.
-        deadline: When the proof had to end.
-        nominal: Whether the motion without errors is proved clear.
-    """
-    evidence = Evidence(
-        pairs=proof.pairs,
-        least=proof.least,
-        counts=proof.counts,
-        deepest=lambda k, worst: is_deepest(worst, proof.motion.asked.ball(k)),
-        counterexamples=counterexamples,
-        nominal=nominal,
-        contacts=contacts,
-    )
-    rows = list(clearance_checks(problem, evidence, deadline if proof.late else None))
-    if said := "".join(f"; {name!r} as a surface only" for name in surfaces(problem)):
-        rows[0] = replace(rows[0], where=rows[0].where + said)
-    return tuple(rows)
 
 
 def clearance_checks(
@@ -114,6 +77,8 @@ def clearance_checks(
         for found in evidence.counterexamples:
             if bool(found.pair.obstacle) == kind:
                 row = _refuted_by(row, found, nominal=evidence.nominal)
+        for mesh in surfaces(problem) if kind else ():
+            row = replace(row, where=f"{row.where}; {mesh!r} as a surface only")
         rows.append(row)
     return tuple(rows)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.proof.prover import Proof
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -49,6 +49,8 @@ def with_depths(
 ) -> LeastClearances:
     """The same, with the depths that balls in both bodies prove.
 
+    Of what a ball about its core grows no depth beyond that is looked for.
+
     Args:
         motion: What is asked.
         least: What is proved of it, or of a part.
@@ -57,30 +59,11 @@ def with_depths(
         deadline: When to leave it at what was found.
     """
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
-    return with_balls(motion, least, np.flatnonzero(near), enough, span, deadline)
-
-
-def with_balls(
-    motion: AskedMotion,
-    least: LeastClearances,
-    pairs: IntArray,
-    enough: float = np.inf,
-    span: FloatArray | None = None,
-    deadline: Deadline = NO_LIMIT,
-) -> LeastClearances:
-    """The same, some pairs refuted by balls in both that are deeper than is proved.
-
-    Args:
-        motion: What is asked.
-        least: What is proved of it, or of a part.
-        pairs: Numbers of those that are looked at.
-        enough: No ball deeper than this is looked for; [m].
-        span: As for `with_depths`.
-        deadline: When to leave it at what was found.
-    """
     span = motion.span if span is None else span
     changed = dict[int, tuple[Any, ...]]()
-    for k in pairs.tolist():
+    for k in np.flatnonzero(near).tolist():
+        if least.verdict[k] == REFUTED and motion.asked.ball(k) > 0.0:
+            continue
         moment = least.interval[k] + least.share[k]
         middle = 0.5 * (least.link_point[k] + least.other_point[k])
         for at in _moments(motion, k, moment, middle, span, deadline):

@@ -21,7 +21,7 @@ ENOUGH: Final = 1e-6
 """How deep a ball in both bodies need lie to tell that they meet; [m]."""
 
 SHALLOW: Final = 1e-7
-"""Of a contact no deeper than this nothing more is told; [m]."""
+"""Of a contact no deeper than this nothing more is told where balls prove it; [m]."""
 
 MOST_MEETINGS: Final = 32
 """Intervals in which a ball in both bodies is looked for; of more none are counted."""
@@ -33,9 +33,6 @@ def contacts_of(
     motion: AskedMotion,
     least: LeastClearances,
     deadline: Deadline = NO_LIMIT,
-    noted: Noted | None = None,
-    *,
-    balls: bool = False,
 ) -> tuple[FirstContact, ...]:
     """Where the clearance is first lost, from obstacles and between bodies.
 
@@ -45,9 +42,6 @@ def contacts_of(
         motion: What is asked of it.
         least: What is proved of all of it.
         deadline: When to give up.
-        noted: The intervals that are too close; None where not all were seen.
-        balls: Whether balls in both bodies tell that they meet too; then intervals are
-            looked for here.
 
     Raises:
         OutOfTime: If the time is over.
@@ -57,18 +51,17 @@ def contacts_of(
     # What is proved of the whole motion holds for its stretches.
     left = np.flatnonzero(least.verdict != CERTIFIED)
     some = motion.among(left)
-    judge = _Judge(some, balls, deadline)
+    judge = _Judge(some, deadline)
     about = problem, some.asked.pairs, least.of(left), trajectory, judge
-    if not balls:
-        return first_contacts(*about, noted)
-    return first_contacts(*about, judge.noted(), SHALLOW)
+    grown = min(some.asked.balls, default=0.0) > 0.0
+    return first_contacts(*about, judge.noted(), 0.0 if grown else SHALLOW)
 
 
 class _Judge:
     """Proves stretches of a motion between moments in waypoints."""
 
-    def __init__(self, motion: AskedMotion, balls: bool, deadline: Deadline) -> None:
-        self._motion, self._balls, self._deadline = motion, balls, deadline
+    def __init__(self, motion: AskedMotion, deadline: Deadline) -> None:
+        self._motion, self._deadline = motion, deadline
         proving = motion.proving(Budget(until=deadline.end))
         self._stretches = Stretches(proving, np.arange(proving.n_pairs))
 
@@ -79,8 +72,6 @@ class _Judge:
         span = motion.knots.inner(np.array([low, high]))
         results, _ = self._stretches.over(*span.tolist())
         least = least_clearances(motion.asked, motion.told(results))
-        if not self._balls:
-            return least
         return with_depths(motion, least, ENOUGH, span, self._deadline)
 
     def noted(self) -> Noted | None:

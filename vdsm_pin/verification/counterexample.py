@@ -219,13 +219,13 @@ def find_counterexamples(
 
     Args:
         motion: What is asked.
-        least: What is proved of it, in intervals of its trajectory.
+        least: What is proved of it, in intervals of its path.
         weakest: Of each pair the interval of its least lower bound, shape (n_pairs,).
         deadline: When to give up.
 
     Returns:
-        One against obstacles and one between links, at most; none where the nominal
-        motion itself is refuted.
+        One against obstacles and one between links, at most, in intervals of the
+        trajectory; none where the nominal motion itself is refuted.
 
     Raises:
         OutOfTime: If the time is over.
@@ -238,10 +238,10 @@ def find_counterexamples(
         order = np.argsort(least.lower[among], kind="stable")
         for k in among[order][:PAIRS].tolist():
             deadline.check()
-            if one := Search(motion, k).find(starts(least, weakest, k)):
+            if one := Search(motion.in_itself, k).find(starts(least, weakest, k)):
                 found.append(one)
                 break
-    return tuple(found)
+    return in_rows(tuple(found), motion.knots)
 
 
 def in_rows(

@@ -10,7 +10,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
-from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.protocols import AnyMotion
 from vdsm_pin.verification.records import Pair
 
@@ -81,33 +80,6 @@ Judge: TypeAlias = Callable[[float, float], Judged]
 Noted: TypeAlias = Mapping[bool, BoolArray]
 """True for pairs with obstacles, False for others: in which of the intervals some pair
 is too close, shape (n_intervals,)."""
-
-
-class TooClose:
-    """Notes the intervals in which a pair is too close; receives brackets as a sink.
-
-    Args:
-        pairs: Every pair, as chunks number them.
-        n_intervals: Of the motion.
-    """
-
-    def __init__(self, pairs: Sequence[Pair], n_intervals: int) -> None:
-        self._of_obstacles = np.array([bool(pair.obstacle) for pair in pairs], bool)
-        self._noted = np.zeros((2, n_intervals), dtype=np.bool_)
-
-    def __call__(self, chunk: ClearanceChunk) -> None:
-        """Receive a chunk."""
-        mine = self._of_obstacles
-        mine = mine if chunk.pairs is None else mine[chunk.pairs]
-        refuted = chunk.verdict == REFUTED
-        here = slice(chunk.first_interval, chunk.first_interval + len(refuted))
-        for noted, columns in zip(self._noted, (~mine, mine), strict=True):
-            noted[here] |= refuted[:, columns].any(axis=1)
-
-    @property
-    def noted(self) -> Noted:
-        """The intervals in which some pair is too close, for each kind of pair."""
-        return {kind: self._noted[int(kind)] for kind in (False, True)}
 
 
 def first_contacts(

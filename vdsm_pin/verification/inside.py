@@ -190,15 +190,12 @@ def is_outside(places: Places) -> bool:
     return all(one.where.side is Side.OUTSIDE for one in places.values())
 
 
-def check_inside(
-    asked: Assembly, places: Places, name: str = ARM_OUTSIDE
-) -> tuple[Check, ...]:
+def check_inside(asked: Assembly, places: Places) -> tuple[Check, ...]:
     """The row of evidence that no body held apart from a mesh is inside it.
 
     Args:
         asked: What is held apart.
         places: What `located` found.
-        name: Of the row.
 
     Returns:
         One row for all meshes that may have an inside; none without.
@@ -214,7 +211,7 @@ def check_inside(
     }
     return (
         Check(
-            name=name,
+            name=ARM_OUTSIDE if asked.chain else LINKS_OUTSIDE,
             verdict=verdict,
             count=len(meshes),
             worst=float(len(bad)),

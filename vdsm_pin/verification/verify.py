@@ -1,18 +1,19 @@
 """The judgement of a trajectory: every check, one row each, in a fixed order."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from math import nan
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.geometry.winding import Side
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import with_hulls
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.approaches import closest_approaches
@@ -20,27 +21,18 @@ from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.best_effort import BestEffort, guarded
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
-from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.coal_arm import coal_reach
 from vdsm_pin.verification.coal_check import COAL, CoalLog, check_coal
-from vdsm_pin.verification.contact_search import contacts_of
-from vdsm_pin.verification.enclosed import (
-    EnclosedSink,
-    Inside,
-    enclosed_checks,
-    enclosed_least,
-    enclosed_profile,
-    pairs_inside,
-)
-from vdsm_pin.verification.first_contact import Noted, TooClose
+from vdsm_pin.verification.enclosed import EnclosedSink, pairs_inside
 from vdsm_pin.verification.inside import (
     Places,
-    check_inside,
+    by_mesh,
     is_outside,
     located,
     located_at_start,
     unlocated,
 )
+from vdsm_pin.verification.judgement import judge_clearance
 from vdsm_pin.verification.limits import check_limits, checks_of_others
 from vdsm_pin.verification.moving import check_timed
 from vdsm_pin.verification.pinocchio_arm import load_arm
@@ -49,7 +41,6 @@ from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.tip import check_tip
-from vdsm_pin.verification.yes_or_no import is_certified
 
 
 def verify(
@@ -85,40 +76,28 @@ def verify(
     """
     _check_input(problem, trajectory)
     model, box = load_arm(problem.manipulator), problem.errors
-    motion = AskedMotion.of_arm(problem, trajectory, box)
+    motion, extras = AskedMotion.of_arm(problem, trajectory, box), BestEffort()
     places = located(motion, deadline)
-    inside = pairs_inside(motion.asked, places)
     reach = coal_reach(problem) if reach is None else reach
-    proved = _proved(problem, trajectory, motion, inside, sinks, deadline, reach)
-    proof, extras = proved.proof, BestEffort()
-    least = enclosed_least(proof.least, inside)
-    name = "search for counterexamples"
-    counterexamples = extras.take(name, (), proof.counterexamples, deadline)
-    name, asked = "proof of the motion without errors", (problem, trajectory, deadline)
-    clear = bool(counterexamples) and extras.take(
-        name, False, _is_clear, motion, *asked
-    )
-    about = problem, trajectory, motion, proof.least, deadline, proved.too_close
-    contacts = extras.take("first contact", (), contacts_of, *about)
+    asked = problem, trajectory, motion, places
+    proof, lowers = _proved(*asked, sinks, deadline, reach)
+    found = judge_clearance(problem, trajectory, proof, places, extras, deadline)
     if sinks and proof.sent < motion.n_intervals:
         extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
-    tip = check_tip(problem, trajectory)
-    near_misses = closest_approaches(problem, trajectory, motion.asked, least)
-    around = dict.fromkeys(proof.pairs[k].obstacle for k in inside)
-    log = CoalLog(near_misses, tuple(around))
-    clearance = check_clearance(
-        problem, proof, counterexamples, contacts, deadline, nominal=clear
-    )
+    tip, nearest = check_tip(problem, trajectory), found.nearest.values()
+    meshes = by_mesh(motion.asked, places).items()
+    around = [name for name, where in meshes if where.side is Side.INSIDE]
+    log = CoalLog(closest_approaches(problem, trajectory, nearest), around)
+    args = problem, trajectory, deadline
     checks = [
         *guarded(fk.NAME, fk.check_fk, model, problem, trajectory, centres, deadline),
         *check_limits(problem, trajectory),
         *checks_of_others(problem.scene),
         *tip.checks,
-        *guarded(pointing.NAME, pointing.check_pointing, *asked, box),
-        *check_inside(motion.asked, places),
-        *enclosed_checks(clearance, motion.asked, places),
-        *guarded(COAL, check_coal, problem, trajectory, proved.lowers, log, deadline),
-        *guarded(cable_check.NAME, cable_check.check_cables, *asked),
+        *guarded(pointing.NAME, pointing.check_pointing, *args, box),
+        *found.checks,
+        *guarded(COAL, check_coal, problem, trajectory, lowers, log, deadline),
+        *guarded(cable_check.NAME, cable_check.check_cables, *args),
     ]
     survived = nan, nan
     if joint_error:
@@ -129,67 +108,42 @@ def verify(
         pairs=proof.pairs,
         checks=tuple(checks),
         approaches=tuple(log.approaches),
-        profile=enclosed_profile(proof.profile, motion.asked, inside),
+        profile=found.profile,
         tip_deviation=tip.deviation,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
         joint_error=survived[0],
         refuted_joint_error=survived[1],
-        counterexamples=counterexamples,
-        nominal_clear=clear,
+        counterexamples=found.counterexamples,
+        nominal_clear=found.nominal_clear,
         not_done=tuple(extras.not_done),
         time_limit=deadline.limit,
-        least=least,
+        least=found.least,
         coal=log.rows(),
     )
-
-
-@dataclass(frozen=True)
-class _Proved:
-    """The clearance proof of a motion, and what its brackets told besides.
-
-    Args:
-        proof: Of every pair over every interval.
-        lowers: Its lower bounds, by interval where they fit into memory.
-        too_close: The intervals that are too close; None where not all were seen.
-    """
-
-    proof: ClearanceProof
-    lowers: ProvedLowers
-    too_close: Noted | None
 
 
 def _proved(
     problem: PlanningProblem,
     trajectory: Trajectory,
     motion: AskedMotion,
-    inside: Mapping[int, Inside],
+    places: Places,
     sinks: Sequence[ClearanceSink],
     deadline: Deadline,
     reach: float,
-) -> _Proved:
-    """The clearance of every pair; `sinks` and `reach` are those of `verify`."""
+) -> tuple[ClearanceProof, ProvedLowers]:
+    """The clearance of every pair, and its lower bounds where they fit into memory.
+
+    `sinks` and `reach` are those of `verify`.
+    """
+    inside = pairs_inside(motion.asked, places)
     wanted = [EnclosedSink(one, inside) if inside else one for one in sinks]
     lowers = LowersSink(problem, trajectory)
-    noted = TooClose(motion.asked.pairs, motion.n_intervals)
-    if sinks or lowers.fits:
-        wanted += [lowers.keep, noted]
+    wanted += [lowers.keep] if sinks or lowers.fits else []
     reach = math.inf if inside else reach
-    proof = prove_motion(problem, trajectory, motion, wanted, deadline, reach)
-    proof = proof.with_meetings(deadline)
-    too_close = noted.noted if proof.sent == motion.n_intervals else None
-    return _Proved(proof, lowers.proved(proof), too_close)
-
-
-def _is_clear(
-    motion: AskedMotion,
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    deadline: Deadline,
-) -> bool:
-    """Whether the motion without errors is proved clear of everything."""
-    outside = is_outside(located(motion.under(ErrorBox()), deadline))
-    return outside and is_certified(problem, trajectory, ErrorBox(), deadline)
+    proof = prove_motion(motion, Budget(until=deadline.end), wanted, reach)
+    proof = proof.with_depths(deadline)
+    return proof, lowers.proved(proof)
 
 
 def _survived(
