@@ -111,8 +111,9 @@ def stretch(result: Refinement) -> str:
 def order(psi: FloatArray) -> str:
     """The link angles in the order in which they first change; psi of shape (n, N)."""
     bent = psi > TOLERANCES.changed_angle
-    first = [(int(np.argmax(bent[:, k])), k + 1) for k in range(1, bent.shape[1])]
-    names = [f"psi{joint}" for row, joint in sorted(first) if row]
+    first = np.argmax(bent[:, 1:], axis=0)
+    together = [np.flatnonzero(first == row) + 2 for row in np.unique(first[first > 0])]
+    names = [" with ".join(f"psi{joint}" for joint in joints) for joints in together]
     return ", ".join(names) or "psi1 alone"
 
 
