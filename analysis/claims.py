@@ -7,6 +7,7 @@ The words are here, every number is measured by this script.
 
 import argparse
 import gc
+import math
 import tempfile
 import time
 from collections.abc import Iterator
@@ -32,6 +33,7 @@ from vdsm_pin.planner.paper.online import OnlineRule
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.motion_facts import changed_angles, motion_facts
+from vdsm_pin.report.words import at_least, quantity
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
@@ -139,12 +141,12 @@ def avoidance(runs: Runs) -> tuple[Claim, Claim]:
     box = ErrorBox(joint=float(np.deg2rad(EXPERIMENT_DEG)))
     for scene in BLOCKED:
         run = runs(scene, "paper")
-        kept.append(f"{scene} {run.verification.min_clearance * MM_PER_M:.2f} mm")
+        kept.append(f"{scene} {at_least(run.verification.min_clearance)}")
         judged = verify(run.problem.under(box), run.trajectory)
         worst = min(one.clearance for one in judged.counterexamples)
         lost.append(f"{scene} {worst * MM_PER_M:.1f} mm")
-        error = np.rad2deg(touching_error(run.refinement))
-        survived.append(f"{scene} {error:.3f}°")
+        error = touching_error(run.refinement)
+        survived.append(f"{scene} {quantity(error, 'rad', math.floor)}")
     exact = Claim(
         "collision-free at every waypoint (6.3)", "holds, and between them",
         f"proved at every instant: {', '.join(kept)}",

@@ -6,6 +6,7 @@ Writes `table.json` and `table.md`. "Paper says" is quoted from the text, with i
 section; "we get" comes from the certified plan and its verification.
 """
 
+import math
 from dataclasses import astuple, dataclass, replace
 from typing import Final
 
@@ -19,6 +20,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.feasibility import curled_reach, straight_reach
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Refinement, plan_and_verify
+from vdsm_pin.report.words import at_least, quantity
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.robust import largest_joint_error
@@ -155,12 +157,12 @@ def rows_of(scene: str, result: Refinement) -> list[Row]:
     if result.plan.problem.scene.obstacles:
         ours["clearance"] = (
             "smallest proved clearance [mm]",
-            f"{verification.min_clearance * MM_PER_M:.3f}",
+            at_least(verification.min_clearance).removesuffix(" mm"),
         )
-        error = np.rad2deg(touching_error(result))
+        error = quantity(touching_error(result), "rad", math.floor)
         ours["error"] = (
             "largest joint error proved without contact [deg]",
-            f"{error:.3f}",
+            error.removesuffix("°"),
         )
     if scene == "obs1":
         for name, row in moments(trajectory, result.plan.tip_path.points).items():
