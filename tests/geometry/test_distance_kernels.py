@@ -17,7 +17,9 @@ from vdsm_pin.geometry.kernels import (
     NORMAL,
     SCRATCH_ROWS,
     UPPER,
+    Goal,
     bracket,
+    bracket_to,
 )
 from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
 from vdsm_pin.geometry.ordering import coherent_order
@@ -241,3 +243,43 @@ def test_coherent_order_is_a_permutation_with_compact_halves() -> None:
     assert sorted(order) == list(range(1000))
     spread = np.ptp(points[order].reshape(8, 125, 3), axis=1).prod(axis=1)
     assert spread.sum() <= 1.0
+
+
+def test_a_bracket_stops_where_it_is_narrow_or_far_enough() -> None:
+    """Wherever it stops, the distance of two balls in closed form lies in it."""
+    rng, early = np.random.default_rng(12), 0
+    for _ in range(300):
+        points, radius = rng.uniform(-1, 1, (30, 3)), float(rng.uniform(0.0, 0.3))
+        centre = rng.uniform(1.5, 4.0) * np.array([0.6, 0.0, 0.8])
+        pieces = pack_pieces([[Hull(centre[None], radius)]])
+        exact = measure(pieces, 0, points)
+        part, lost = float(rng.uniform(0.0, 0.5)), float(rng.uniform(0.0, 0.5))
+        enough = float(rng.uniform(0.0, 4.0))
+        out, scratch = np.zeros(BRACKET + 4), np.zeros((SCRATCH_ROWS, 3))
+        out[NORMAL:NEAR] = [0.3, -0.5, 0.7]
+        body = new_body(30, 30, 0)
+        body.points[:] = points
+        bracket_to(pieces, 0, body, Goal(GOAL, part, lost, enough), scratch, out)
+        low, high = out[LOWER], out[UPPER]
+        assert low <= exact[UPPER] + 1e-12 and high >= exact[LOWER] - 1e-12
+        n = out[NORMAL:NEAR]
+        assert low <= n @ centre - radius - (points @ n).max() + 1e-12
+        wide = max(GOAL, part * (low - lost))
+        assert high - low <= wide + 1e-12 or low >= enough
+        early += bool(high - low > 2.0 * GOAL)
+    assert early > 100
+
+
+def test_radius_counts_as_what_clearance_is_less_by() -> None:
+    """A ball of 1 m at 1 mm: a tenth of the clearance is 0.1 mm, not 100 mm."""
+    box = np.array(BOX_CORNERS, dtype=np.float64) @ random_rotation(
+        np.random.default_rng(4)
+    )
+    face = float((box @ [1.0, 0.0, 0.0]).max())
+    ball = Hull(np.array([[face + 1.001, 0.1, 0.2]]), 1.0)
+    pieces, out = pack_pieces([[ball]]), np.zeros(BRACKET + 4)
+    out[NORMAL:NEAR] = [0.9, 0.3, -0.3]
+    body, scratch = new_body(8, 8, 0), np.zeros((SCRATCH_ROWS, 3))
+    body.points[:] = box
+    bracket_to(pieces, 0, body, Goal(GOAL, 0.1, 0.0, np.inf), scratch, out)
+    assert out[UPPER] - out[LOWER] <= max(GOAL, 0.1 * out[LOWER]) + 1e-12

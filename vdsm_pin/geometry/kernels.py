@@ -6,7 +6,7 @@ distance of two points that lie in the two bodies.
 """
 
 from math import sqrt
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,22 @@ MAX_STEPS: Final = 60
 
 SCRATCH_ROWS: Final = 14
 """Rows of three numbers that `bracket` needs as working space."""
+
+
+class Goal(NamedTuple):
+    """How wide a bracket at which to stop.
+
+    Args:
+        width: So wide at least; [m].
+        part: Or this part of the clearance, where that is more; [-].
+        lost: What the clearance is less than the distance; [m].
+        enough: A distance proved from which on no bracket is asked for; [m].
+    """
+
+    width: float
+    part: float
+    lost: float
+    enough: float
 
 
 @compiled
@@ -201,7 +217,7 @@ def _iterate(
     pieces: PackedPieces,
     p: int,
     body: Body,
-    goal: float,
+    goal: Goal,
     scratch: FloatArray,
     out: FloatArray,
 ) -> None:
@@ -218,7 +234,8 @@ def _iterate(
         if raised:
             out[LOWER] = gap
             out[NORMAL], out[NORMAL + 1], out[NORMAL + 2] = nx, ny, nz
-        if out[UPPER] - out[LOWER] <= goal:
+        width = max(goal.width, goal.part * (out[LOWER] - goal.lost))
+        if out[UPPER] - out[LOWER] <= width or out[LOWER] >= goal.enough:
             break
         for c in range(3):
             scratch[m, c] = scratch[8 + m, c] - scratch[4 + m, c]
@@ -243,13 +260,26 @@ def bracket(
     scratch: FloatArray,
     out: FloatArray,
 ) -> None:
+    """`bracket_to` of a width alone; [m]."""
+    bracket_to(pieces, p, body, Goal(goal, 0.0, 0.0, np.inf), scratch, out)
+
+
+@compiled
+def bracket_to(
+    pieces: PackedPieces,
+    p: int,
+    body: Body,
+    goal: Goal,
+    scratch: FloatArray,
+    out: FloatArray,
+) -> None:
     """Distance between a body and a piece.
 
     Args:
         pieces: The scene.
         p: Number of the piece.
         body: The body.
-        goal: Width of the bracket at which to stop; [m].
+        goal: Width of the bracket at which to stop.
         scratch: Working space, shape (SCRATCH_ROWS, 3).
         out: Shape (BRACKET + 4,). On entry out[NORMAL:NEAR] is a first guess of n, not
             zero; on return the bracket. Where the bodies meet both bounds are below or
@@ -265,8 +295,10 @@ def bracket(
         length = 1.0
     for c in range(3):
         out[NORMAL + c] /= length
-    _iterate(pieces, p, body, goal, scratch, out)
     radius = rounding_radius(pieces, p)
+    lost, enough = goal.lost + radius, goal.enough + radius
+    core = Goal(goal.width, goal.part, lost, enough)
+    _iterate(pieces, p, body, core, scratch, out)
     if radius > 0.0:
         out[LOWER] -= radius
         out[UPPER] -= radius

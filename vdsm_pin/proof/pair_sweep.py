@@ -12,7 +12,7 @@ import numpy as np
 from vdsm_pin.compiled import apart, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
-from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
+from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL, Goal
 from vdsm_pin.geometry.obstacles import node_support
 from vdsm_pin.proof.cached_clearances import hold
 from vdsm_pin.proof.cached_planes import Demand, try_plane
@@ -87,7 +87,7 @@ def _renew(
     work: Workspace,
     local: int,
     pair: int,
-    goal: float,
+    goal: Goal,
     bar: float,
 ) -> float:
     """A new plane and witness for a pair, from one interval of the block.
@@ -98,7 +98,7 @@ def _renew(
         work: Working space, its rows filled.
         local: The interval.
         pair: The pair.
-        goal: Width of a distance bracket at which to stop; [m].
+        goal: Width of a distance bracket at which to stop.
         bar: Clearances below it are to be as good as they can be; [m].
 
     Returns:
@@ -113,6 +113,7 @@ def _renew(
     load_rows(task, mover, work, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
     if last - p == 1:
+        goal = Goal(goal.width, goal.part, mover.lost, np.inf)
         leaf_bracket(pieces, space, p, goal, True, space.out)
     else:
         loaded_bound(task, space, row, True, bar)
@@ -174,7 +175,7 @@ def _subdivide(
     row, witness = np.zeros(SLICE), new_witness()
     slicing = Slicing(task, motion, work.ends, work.space)
     k = stretch.start + local
-    row[INTERVAL], row[PAIR], row[END] = k, pair, 1.0
+    row[INTERVAL], row[PAIR], row[END], row[KEY] = k, pair, 1.0, -np.inf
     witness.value[KNOWN] = results.best[pair, UP]
     verdict, count = resolve(slicing, work.heap, row, witness)
     results.tally[SLICES] += count
@@ -276,9 +277,13 @@ def sweep_pair(
     apart()
     rules, rows, runs, plane = task.rules, work.rows, work.runs, work.planes[pair]
     required, group = task.pairs.required[pair], task.pairs.group[pair]
-    goal, count, yes_or_no = rules.goal, stretch.size, stretch.yes_or_no
+    count, yes_or_no = stretch.size, stretch.yes_or_no
+    goal = Goal(rules.goal, 0.0, 0.0, np.inf)
     if not stretch.closely:
-        goal = max(rules.goal, ROUGH * rules.slack * required)
+        part = ROUGH * rules.slack
+        # Of a segment the bracket has the witness too, of any other body the plane.
+        of_clearance = part if mover_of(task, pair).inverse < 0.0 else 0.0
+        goal = Goal(max(rules.goal, part * required), of_clearance, 0.0, np.inf)
     slack = np.inf if yes_or_no else rules.slack
     local, tried, fresh, proved = 0, count, False, -np.inf
     row = int(plane[ROW]) if plane[SUPPORT] > -np.inf else finer(task.pairs, pair, pair)

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.kernels import NEAR, NORMAL
+from vdsm_pin.geometry.kernels import NEAR, NORMAL, Goal
 from vdsm_pin.geometry.pieces import HALF_SPACE
 from vdsm_pin.proof.layouts import (
     CLAIM,
@@ -119,7 +119,8 @@ def _write_ranges(
         waiting -= 1
         node = nodes[waiting]
         if pieces.node_range[node, 1] - pieces.node_range[node, 0] == 1:
-            leaf_bound(task, space, node, lost, False, space.trial)
+            goal = Goal(task.rules.goal, 0.0, lost, np.inf)
+            leaf_bound(task, space, node, goal, False, space.trial)
             n[:] = space.trial[NORMAL:NEAR]
             claim = _shortened(task, work, row, node, n)
             count = _write(task, row, node, n, claim, records, count)

@@ -135,13 +135,17 @@ def place_pair(slicing: Slicing, row: FloatArray) -> None:
 
 
 @compiled
-def _bound_towards(slicing: Slicing, row: FloatArray, aim: float) -> bool:
+def _bound_towards(
+    slicing: Slicing, row: FloatArray, aim: float, enough: float = np.inf
+) -> bool:
     """Bound a slice by the roughest version of its pair that shows if it is enough.
 
     Args:
         slicing: What they are bounded with.
-        row: The slice; row[KEY] is written.
-        aim: A bound that is enough; [m].
+        row: The slice; row[KEY] is written, on entry it is what is known of it or of
+            one that holds it.
+        aim: A bound that is enough of a rough version; [m].
+        enough: Of the pair itself, where its partner is of one piece; [m].
 
     Returns:
         Whether the bound is that of the pair itself.
@@ -149,16 +153,20 @@ def _bound_towards(slicing: Slicing, row: FloatArray, aim: float) -> bool:
     apart()
     place_pair(slicing, row)
     task, ends, space = slicing.task, slicing.ends, slicing.space
-    pair, h = int(row[PAIR]), row[END] - row[START]
+    pair, h, missing = int(row[PAIR]), row[END] - row[START], aim - row[KEY]
     version = finer(task.pairs, pair, pair)
     while version != pair:
-        slice_bound(task, ends, space, version, h)
-        row[KEY], loose = space.out[LOWER], task.pairs.loose[version]
+        loose = task.pairs.loose[version]
+        if missing < loose:  # less than what a rough version misses
+            version = finer(task.pairs, pair, version)
+            continue
+        slice_bound(task, ends, space, version, h, enough)
+        row[KEY] = space.out[LOWER]
         hopeless = h > 0.0 and row[KEY] + loose + task.rules.goal < aim
         if row[KEY] >= aim or hopeless:
             return False
         version = finer(task.pairs, pair, version)
-    slice_bound(task, ends, space, pair, h)
+    slice_bound(task, ends, space, pair, h, enough)
     row[KEY] = space.out[LOWER]
     return True
 
@@ -190,22 +198,28 @@ def examine(slicing: Slicing, row: FloatArray, t: float, witness: Witness) -> No
 
 @compiled
 def split(
-    slicing: Slicing, row: FloatArray, heap: FloatArray, count: int, aim: float
+    slicing: Slicing,
+    row: FloatArray,
+    heap: FloatArray,
+    count: int,
+    aim: float,
+    enough: float,
 ) -> int:
     """Push the two halves of a slice; returns the new count of the heap.
 
-    Bounds are as good as can be where that decides whether they come up to the aim.
+    Bounds are as good as can be where that decides whether they come up to the aim, or
+    to what is enough.
     """
     apart()
     start, end = row[START], row[END]
     middle = 0.5 * (start + end)
     half = row.copy()
     half[END] = middle
-    _bound_towards(slicing, half, aim)
+    _bound_towards(slicing, half, aim, enough)
     half[KEY] = max(half[KEY], row[KEY])
     count = push(heap, count, half)
-    half[START], half[END] = middle, end
-    _bound_towards(slicing, half, aim)
+    half[START], half[END], half[KEY] = middle, end, row[KEY]
+    _bound_towards(slicing, half, aim, enough)
     half[KEY] = max(half[KEY], row[KEY])
     return push(heap, count, half)
 
@@ -220,7 +234,7 @@ def resolve(
         slicing: What they are bounded with.
         heap: Working space; its length is the budget. On return its first rows tile
             the slice.
-        row: The slice; row[KEY] is the proved bound on return.
+        row: The slice; row[KEY] is the proved bound on return, on entry -inf.
         witness: The least upper bound, updated.
 
     Returns:
@@ -257,7 +271,7 @@ def resolve(
             break
         middle = 0.5 * (row[START] + row[END])
         examine(slicing, row, middle, witness)
-        count = split(slicing, row, heap, count, required)
+        count = split(slicing, row, heap, count, required, np.inf)
     row[KEY] = heap[0, KEY]
     return verdict, count
 
@@ -303,5 +317,5 @@ def tighten(
             witnesses.time[pair] = middle
             witnesses.points[pair] = witness.points
         aim = least - task.rules.gap
-        count = split(slicing, row, heap, count, aim)
+        count = split(slicing, row, heap, count, aim, aim)
     return count

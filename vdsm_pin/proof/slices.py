@@ -14,7 +14,8 @@ from vdsm_pin.geometry.kernels import (
     NORMAL,
     SCRATCH_ROWS,
     UPPER,
-    bracket,
+    Goal,
+    bracket_to,
     keep_least,
 )
 from vdsm_pin.geometry.obstacles import (
@@ -110,7 +111,7 @@ def leaf_bracket(
     pieces: PackedPieces,
     space: Space,
     p: int,
-    goal: float,
+    goal: Goal,
     sighted: bool,
     out: FloatArray,
 ) -> None:
@@ -120,7 +121,7 @@ def leaf_bracket(
         pieces: The scene.
         space: Its `body` is loaded.
         p: Number of the piece.
-        goal: Width of the bracket at which to stop; [m].
+        goal: Width of the bracket at which to stop.
         sighted: Whether witnesses are wanted where errors grow the body.
         out: Guess of n on entry. On return `lower` and n are of the best plane; `upper`
             and the witnesses are of the hull of the points alone, inf where not wanted.
@@ -132,11 +133,13 @@ def leaf_bracket(
         ball = max(ball, body.balls[corner])
     wide[NORMAL:NEAR] = out[NORMAL:NEAR]
     if sighted or not grown:
-        bracket(pieces, p, space.core, goal, space.scratch, out)
+        enough = np.inf if grown else goal.enough + ball
+        core = Goal(goal.width, goal.part, goal.lost + ball, enough)
+        bracket_to(pieces, p, space.core, core, space.scratch, out)
     else:
         out[UPPER] = np.inf
     if grown:
-        bracket(pieces, p, body, goal, space.scratch, wide)
+        bracket_to(pieces, p, body, goal, space.scratch, wide)
         out[LOWER] = wide[LOWER]
         out[NORMAL:NEAR] = wide[NORMAL:NEAR]
     elif ball > 0.0:
@@ -146,7 +149,7 @@ def leaf_bracket(
 
 @compiled
 def leaf_bound(
-    task: Task, space: Space, node: int, lost: float, sighted: bool, out: FloatArray
+    task: Task, space: Space, node: int, goal: Goal, sighted: bool, out: FloatArray
 ) -> None:
     """Replace the distance bracket of a piece by the clearance that its plane proves.
 
@@ -154,13 +157,13 @@ def leaf_bound(
         task: The scene and the rules.
         space: Its `body` is loaded.
         node: Node of the one piece.
-        lost: What every plane of the pair loses; [m].
+        goal: What every plane of the pair loses, and what is enough.
         sighted: As for `leaf_bracket`.
         out: The same; on return `lower` is the bound over the slice.
     """
     p = task.pieces.node_range[node, 0]
-    leaf_bracket(task.pieces, space, p, task.rules.goal, sighted, out)
-    out[LOWER] -= lost
+    leaf_bracket(task.pieces, space, p, goal, sighted, out)
+    out[LOWER] -= goal.lost
 
 
 @compiled
@@ -190,14 +193,20 @@ def _mesh_bound(
         if last - first > 1:
             waiting = push_children(pieces, node, low, high, nodes, waiting)
             continue
-        leaf_bound(task, space, node, lost, sighted, trial)
+        goal = Goal(task.rules.goal, 0.0, lost, np.inf)
+        leaf_bound(task, space, node, goal, sighted, trial)
         keep_least(trial, out)
     out[LOWER] = min(out[LOWER], left_out)
 
 
 @compiled
 def loaded_bound(
-    task: Task, space: Space, pair: int, sighted: bool, enough: float
+    task: Task,
+    space: Space,
+    pair: int,
+    sighted: bool,
+    ease: float,
+    enough: float = np.inf,
 ) -> None:
     """`slice_bound` where the body is in the working space already.
 
@@ -206,21 +215,25 @@ def loaded_bound(
         space: Its `body` is loaded; otherwise as for `slice_bound`.
         pair: Number of the pair.
         sighted: As for `leaf_bracket`.
-        enough: From here on the bound may be below the best one by a part of it, where
+        ease: From here on the bound may be below the best one by a part of it, where
             the partner is of many pieces; [m].
+        enough: From here on no better bound is looked for, where it is of one; [m].
     """
     apart()
     pieces, lost = task.pieces, task.pairs.lost[pair]
     root = pieces.root[task.pairs.obstacle[pair]]
     first, last = pieces.node_range[root]
     if last - first == 1:
-        leaf_bound(task, space, root, lost, sighted, space.out)
+        goal = Goal(task.rules.goal, 0.0, lost, enough + lost)
+        leaf_bound(task, space, root, goal, sighted, space.out)
     else:
-        _mesh_bound(task, space, root, lost, sighted, enough)
+        _mesh_bound(task, space, root, lost, sighted, ease)
 
 
 @compiled
-def slice_bound(task: Task, ends: Ends, space: Space, pair: int, h: float) -> None:
+def slice_bound(
+    task: Task, ends: Ends, space: Space, pair: int, h: float, enough: float = np.inf
+) -> None:
     """Least clearance of a pair over a slice, proved by planes.
 
     Args:
@@ -231,7 +244,8 @@ def slice_bound(task: Task, ends: Ends, space: Space, pair: int, h: float) -> No
             the core distance of the hull of all points, where it is known.
         pair: Number of the pair.
         h: Length of the slice; 0 for an instant, where `upper` is a true distance.
+        enough: As for `loaded_bound`; inf for an instant.
     """
     apart()
     load_body(task, mover_of(task, pair), ends, space.body, h)
-    loaded_bound(task, space, pair, h == 0.0, np.inf)
+    loaded_bound(task, space, pair, h == 0.0, np.inf, enough)

@@ -124,7 +124,7 @@ def _judge_slices(
         least, plane = best[pair], work.planes[pair]
         for k in range(slices.shape[0]):
             row[INTERVAL], row[PAIR] = slices[k, 0], pair
-            row[START], row[END] = slices[k, 1], slices[k, 2]
+            row[START], row[END], row[KEY] = slices[k, 1], slices[k, 2], -np.inf
             witness = new_witness()
             witness.value[KNOWN] = least[UP]
             space.out[NORMAL:NEAR] = plane[:3]
