@@ -59,7 +59,7 @@ def new_body(n_points: int, n_corners: int, room: int) -> Body:
     count[0], count[1] = n_points, n_corners
     return Body(
         np.zeros((n_points, 3)),
-        np.zeros((grown, room, 3)),
+        np.empty((grown, room, 3)),  # noqa: TID251 (read where `sizes` says so)
         np.zeros(grown, np.int64),
         np.zeros(grown),
         np.zeros((2, 4)),

@@ -89,9 +89,11 @@ def _sweep(
 ) -> bool:
     """`sweep` of what is borrowed."""
     apart()
-    if task.rules.steady:
+    grown = work.rows.block
+    if task.rules.steady and grown[4]:
         # Whoever asks about several error boxes leaves here what the last one added.
         work.runs.growth[:] = 0.0
+    grown[4] = not task.rules.steady
     limit, settled = results.limit, np.zeros(2, np.bool_)
     before, (first, last) = limit.copy(), span
     for start in range(first, last, BLOCK):

@@ -71,7 +71,7 @@ def _look_again(
     held, lower, count = results.candidates, work.runs.lower, 0
     heap = work.intervals
     row, beyond = np.zeros(SLICE), results.overflow
-    row[END], filled = 1.0, -1
+    row[END], block = 1.0, work.rows.block
     for c in order:
         if clock() > task.rules.until:
             break
@@ -81,9 +81,8 @@ def _look_again(
             beyond[group] = min(beyond[group], held.lower[c])
             continue
         start, size, pair = held.first[c], held.size[c], held.pair[c]
-        if start != filled:
+        if start != block[5] or size != block[1]:  # what was judged last is there
             fill_rows(task, motion, work.rows, start, size)
-            filled = start
         stretch = Stretch(start, 0, size, True, False, True)
         sweep_pair(task, motion, work, results, pair, stretch)
         for local in range(size):

@@ -108,6 +108,7 @@ def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) ->
     straight = motion.inner.shape[1] == 0
     rows.block[0] += 1
     rows.block[1], rows.block[2], rows.block[3] = count, 0 if straight else 1, 0
+    rows.block[5] = first
     for joint in range(tree.parent.size):
         move_frame(tree, motion, rows, first, count + 1, joint)
     bound_joints(tree, motion, rows, first, count)

@@ -46,7 +46,8 @@ class Rows(NamedTuple):
             (n_joints, 3, BLOCK).
         work: Working space, shape (8, BLOCK + 1).
         block: Number of the block, from 1, its intervals, 1 where pieces are not
-            straight, and 1 where all places are known, shape (4,).
+            straight, 1 where all places are known, 1 where errors turned in what was
+            judged last, and the first interval, shape (6,).
     """
 
     frames: FloatArray
@@ -88,7 +89,7 @@ def new_rows(n_frames: int, n_ways: int, tracks: Tracks, block: int) -> Rows:
         np.zeros((n_ways, 4, block)),
         np.zeros((n_frames - 1, 3, block)),
         np.zeros((8, block + 1)),
-        np.zeros(4, np.int64),
+        np.zeros(6, np.int64),
     )
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import apart, compiled
-from vdsm_pin.geometry.arrays import FloatArray, uncleared
+from vdsm_pin.geometry.arrays import FloatArray, paged_zeros, uncleared
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
 from vdsm_pin.proof.packed_tree import REVOLUTE, Pose
@@ -70,7 +70,7 @@ def new_workspace(
     forget(planes)
     return Workspace(
         new_rows(n_joints + 1, n_ways, tracks, block),
-        new_runs(corners, block),
+        new_runs(0, block)._replace(growth=paged_zeros(corners, block)),
         planes,
         new_ends(n_joints + 1, n_ways, n_columns),
         new_space(int((task.tree.kind == REVOLUTE).sum()), corners),
