@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from vdsm_pin.report.files import VerificationFile
 from vdsm_pin.report.robot_facts import reached
 from vdsm_pin.robots.cell import Cell, cell_of, read_cell
 from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.judgement import verify_robot
+from vdsm_pin.robots.judgement import NEAR, verify_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.second_opinion import pose_difference
@@ -26,6 +27,7 @@ from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.clearance_check import OBSTACLES
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two">
@@ -147,6 +149,31 @@ def test_without_a_pair_to_check_nothing_is_green(tmp_path: Path) -> None:
     bad = [row for row in rows.checks if row.verdict is not Verdict.CERTIFIED]
     assert [(row.name, row.count) for row in bad] == [("clearance between links", 0)]
     assert bad[0].where.startswith("no pair to check")
+
+
+@pytest.mark.parametrize("wrong", [None, "nearer", "farther"])
+def test_far_pairs_are_held_against_balls_by_coal(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, wrong: str | None
+) -> None:
+    """Near pairs and the ten that are listed are measured, the others' balls asked."""
+    balls = [Sphere(f"b{k}", np.array([3.0, 0.0, float(k)]), 0.1) for k in range(9)]
+    true = CoalShapes.between_balls
+
+    def moved(self: CoalShapes, poses: Any, sides: Sides) -> Any:
+        low, high = true(self, poses, sides)
+        far = {None: 0.0, "nearer": -9.0, "farther": 9.0}[wrong]
+        return low + far, high + far
+
+    monkeypatch.setattr(CoalShapes, "between_balls", moved)
+    cell, path = Cell(robot, Scene(tuple(balls))), Motion(np.array([[0.0, 0.0]]))
+    found = verify_robot(cell, path)
+    (row,) = [check for check in found.checks if "Coal" in check.name]
+    near = (found.least.lower < NEAR).sum()
+    assert row.count == max(near, len(found.approaches)) < len(found.pairs)
+    assert "the others are far, by balls about the bodies" in row.where
+    good = Verdict.UNDECIDED if wrong else Verdict.CERTIFIED
+    assert row.verdict is good and (row.worst > 1.0) == bool(wrong)
+    assert all(np.isfinite(one.coal) for one in found.approaches)
 
 
 def test_a_shape_that_coal_cannot_take_is_named(tmp_path: Path) -> None:

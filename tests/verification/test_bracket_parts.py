@@ -525,9 +525,11 @@ def test_a_row_of_clearance_is_its_worst_pair(late: bool) -> None:
         counts = np.zeros((n, 3), np.int64)
         counts[:, CERTIFIED] = rng.integers(0, 5, n)
         counts[np.arange(n), verdict] += rng.integers(1, 5, n)
+        outer = np.array([bool(pair.obstacle) for pair in pairs])
         evidence = Evidence(
-            pairs, least, counts, lambda k, worst: worst < -0.001 * k, (), False, ()
-        )
+            pairs, outer, least, counts, lambda k, worst: worst < -0.001 * k, (), False,
+            (),
+        )  # fmt: skip
         rows = clearance_checks(asked, evidence, Deadline(3.0) if late else None)
         expected = []
         for name, limit, kind in ((OBSTACLES, 0.03, True), (LINKS, 0.04, False)):
@@ -578,9 +580,8 @@ def test_contacts_and_counterexamples_stand_in_the_row_of_their_kind() -> None:
     )
 
     def rows(contacts: Any, examples: Any = (), nominal: bool = False) -> Any:
-        told = Evidence(
-            pairs, least, counts, lambda *_: False, examples, nominal, contacts
-        )
+        outer, found = np.array([True, False]), (examples, nominal, contacts)
+        told = Evidence(pairs, outer, least, counts, lambda *_: False, *found)
         return clearance_checks(problem(), told)
 
     near, links = rows((first, alone))
@@ -621,7 +622,8 @@ def test_pairs_that_come_nearest_are_listed_obstacles_first() -> None:
             for k in range(n)
         )
         least = random_least(rng, rng.integers(0, 3, n))
-        found = nearest_pairs(pairs, least)
+        outer = np.array([bool(pair.obstacle) for pair in pairs], bool)
+        found = nearest_pairs(pairs, outer, least)
         known = [k for k in range(n) if np.isfinite(least.upper[k])]
         known.sort(key=lambda k: (not pairs[k].obstacle, least.upper[k]))
         assert [*found] == known[:10]

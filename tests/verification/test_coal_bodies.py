@@ -17,7 +17,15 @@ from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.geometry.solids import Cylinder, Mesh, PointCloud, Prism, Sphere
+from vdsm_pin.geometry.solids import (
+    Box,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    PointCloud,
+    Prism,
+    Sphere,
+)
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -482,3 +490,30 @@ def test_one_unusable_answer_of_many_spoils_its_pair_alone(
     monkeypatch.setattr(coal, "distance", failing)
     found = measure_each(calls, 3).distance
     assert found.tolist() == [honest[0], -np.inf, honest[2]]
+
+
+def test_bodies_are_as_far_as_the_balls_around_them_say() -> None:
+    """Coal's distance lies between the two; of several parts there is no ball."""
+    rng, eye = np.random.default_rng(5), np.eye(4)[None, None, :3]
+    cube = rng.uniform(-0.2, 0.2, (12, 3))
+    bodies = [
+        coal_bodies(Box("b", np.array([0.1, 0.2, 0.0]), np.eye(3), np.full(3, 0.3))),
+        coal_bodies(Sphere("s", np.array([0.0, 0.5, 0.0]), 0.2)),
+        coal_parts([Hull(cube)]),
+        coal_parts([Hull(cube), Hull(cube + 1.0)]),
+        coal_bodies(HalfSpace("h", np.array([0.0, 0.0, -3.0]), np.eye(3)[2])),
+    ]  # fmt: skip
+    shapes = CoalShapes(range(1, 6), bodies)
+    for _ in range(20):
+        poses = np.tile(eye, (1, 6, 1, 1))
+        for frame in range(1, 6):
+            poses[0, frame, :, :3] = rotation_from_rpy(rng.uniform(-3.0, 3.0, 3))
+            poses[0, frame, :, 3] = rng.uniform(-2.0, 2.0, 3)
+        one, other = np.array([0, 0, 1, 0, 0]), np.array([1, 2, 2, 3, 4])
+        sides = Sides(np.zeros(5, np.int64), one, other)
+        low, high = shapes.between_balls(poses, sides)
+        told = shapes.distances(poses, sides).distance[:3]
+        assert (low[:3] <= told + 1e-9).all() and (told <= high[:3] + 1e-9).all()
+        assert (high[:3] - low[:3] < 2.5).all()
+        assert np.isnan(low[3]) and np.isnan(high[3])
+        assert low[4] == -np.inf and high[4] == np.inf

@@ -142,6 +142,21 @@ class Cell(AnyProblem):
         frames = [body.frame for body in self.asked.bodies]
         return CoalShapes(frames, [*link_shapes(self.robot), *things])
 
+    def sides(
+        self, one: IntArray, other: IntArray, row: IntArray | None = None
+    ) -> Sides:
+        """Pairs of bodies as Coal is asked about them, each at a row of poses.
+
+        Args:
+            one: Their first bodies, shape (m,).
+            other: The second ones, shape (m,).
+            row: That of each pair, shape (m,); None where each has its own.
+        """
+        # Seen from the obstacle, the first body of its pairs: a cloud has no pose.
+        outer = one >= len(self.robot.bodies)
+        rows = np.arange(len(one)) if row is None else row
+        return Sides(rows, np.where(outer, other, one), np.where(outer, one, other))
+
     def distances(
         self,
         one: IntArray,
@@ -152,16 +167,13 @@ class Cell(AnyProblem):
         """Coal's of pairs of bodies, shape (m,); [m]. NaN for none.
 
         Args:
-            one: Their first bodies, shape (m,).
-            other: The second ones, shape (m,).
+            one: As for `sides`.
+            other: The same.
             poses: Of all frames at some rows, shape (n_rows, n_frames, 4, 4); [m].
-            row: That of each pair, shape (m,); None where each has its own.
+            row: As for `sides`.
         """
-        # Seen from the obstacle, the first body of its pairs: a cloud has no pose.
-        outer = one >= len(self.robot.bodies)
-        sides = np.where(outer, other, one), np.where(outer, one, other)
-        placed = Sides(np.arange(len(poses)) if row is None else row, *sides)
-        return self.coal.distances(poses[:, :, :3], placed).distance
+        sides = self.sides(one, other, row)
+        return self.coal.distances(poses[:, :, :3], sides).distance
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Robot, scene and what is required."""

@@ -1,12 +1,13 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, first_equal
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
@@ -18,15 +19,18 @@ from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
 from vdsm_pin.verification.clearance_check import LINKS
 from vdsm_pin.verification.coal_check import CoalEvidence
-from vdsm_pin.verification.coal_shapes import disagreement
+from vdsm_pin.verification.coal_shapes import Sides, disagreement
 from vdsm_pin.verification.inside import located
 from vdsm_pin.verification.judgement import judge_clearance
 from vdsm_pin.verification.limits import checks_of_others
 from vdsm_pin.verification.records import Check, Verdict, Verification
 
 NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
-WIDTH: Final = 0.1
+WIDTH: Final = 0.2
 """Brackets wider than this part of the clearance are asked of a new plane; [-]."""
+
+NEAR: Final = 0.1
+"""Coal measures pairs that may come nearer than this beyond what is required; [m]."""
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -58,10 +62,9 @@ def verify_robot(
     motion = AskedMotion.of_robot(cell.asked, path, cell.errors)
     budget, extras = Budget(until=deadline.end, slack=WIDTH), BestEffort()
     proof, places = prove_motion(motion, budget), located(motion, deadline)
-    coal, measured = _coal(cell, proof)
-    proof = proof.with_depths(deadline)
-    asked = cell, path, proof, places, extras, deadline
+    asked = cell, path, proof.with_depths(deadline), places, extras, deadline
     found = judge_clearance(*asked, contacts=contacts)
+    coal, measured = _coal(cell, proof, [*found.nearest])
     checks = [
         *checks_by_itself(cell.robot, path),
         *checks_of_others(cell.scene),
@@ -90,12 +93,18 @@ def _no_pair(cell: Cell) -> Check:
     return Check(LINKS, Verdict.UNDECIDED, 0, nan, needed, "m", NO_PAIR)
 
 
-def _coal(cell: Cell, proof: ClearanceProof) -> tuple[Check, FloatArray]:
-    """Coal's distance of each pair at its witness, which the bracket must hold.
+def _coal(
+    cell: Cell, proof: ClearanceProof, told: Sequence[int]
+) -> tuple[Check, FloatArray]:
+    """Coal's distance of each near pair at its witness, which the bracket must hold.
+
+    Of a pair that is proved to keep farther off Coal's balls about its bodies must not
+    contradict the bracket, where each is of one part.
 
     Args:
         cell: Robot and scene.
         proof: Of its pairs.
+        told: Numbers of the pairs whose distance is told.
 
     Returns:
         The check, and the distances, NaN where there is none, shape (n_pairs,); [m].
@@ -103,19 +112,28 @@ def _coal(cell: Cell, proof: ClearanceProof) -> tuple[Check, FloatArray]:
     asked, least, motion = cell.asked, proof.inner, proof.motion
     table, found = asked.table, np.full(asked.table.size, nan)
     seen = np.flatnonzero(np.isfinite(least.upper))
-    when = np.stack([least.interval[seen], least.share[seen]], axis=1)
-    first, row = first_equal(when)
-    rows = motion.path.within(least.interval[seen[first]], when[first, 1])
-    poses = asked.poses(rows)
-    found[seen] = cell.distances(table.one[seen], table.other[seen], poses, row)
-    off = disagreement(found, least.lower, least.upper)
-    moments = motion.knots.moments(least.interval, least.share)
-    measured = np.flatnonzero(~np.isnan(found))
-    evidence = CoalEvidence(count=len(measured))
-    if measured.size:
-        worst = measured[np.argmax(off[measured])]
-        evidence.add(float(off[worst]), "", float(moments[worst]))
+    when = least.interval[seen] + least.share[seen]
+    _, first, row = np.unique(when, return_index=True, return_inverse=True)
+    at = seen[first]
+    poses = asked.poses(motion.path.within(least.interval[at], least.share[at]))
+    sides = cell.sides(table.one[seen], table.other[seen], row)
+    lower, upper = least.lower[seen], least.upper[seen]
+    low, high = cell.coal.between_balls(poses[:, :, :3], sides)
+    close = (lower < table.required[seen] + NEAR) | np.isnan(low)
+    close |= np.isin(seen, told)
+    near = Sides(*(side[close] for side in sides))
+    found[seen[close]] = cell.coal.distances(poses[:, :, :3], near).distance
+    off = disagreement(found[seen], lower, upper)
+    off[~close] = np.maximum(low - upper, lower - high)[~close]
+    evidence = CoalEvidence(count=int((~np.isnan(found)).sum()))
+    answered = np.flatnonzero(~np.isnan(off))
+    if answered.size:
+        worst = answered[np.argmax(off[answered])]
+        k = seen[worst : worst + 1]
+        (moment,) = motion.knots.moments(least.interval[k], least.share[k])
+        evidence.add(float(off[worst]), "", float(moment))
     where = f"{evidence.count} of {table.size} pairs measured"
     untold = cell.coal.untold([body.name for body in asked.bodies])
-    note = f"{where}, each where it was found nearest{untold}"
+    others = "" if close.all() else "; the others are far, by balls about the bodies"
+    note = f"{where}, each where it was found nearest{others}{untold}"
     return evidence.check(note), found

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
@@ -31,7 +31,7 @@ def closest_approaches(
 
 
 def nearest_pairs(
-    pairs: Sequence[Pair], least: LeastClearances
+    pairs: Sequence[Pair], outer: BoolArray, least: LeastClearances
 ) -> dict[int, ClosestApproach]:
     """The pairs of least upper bounds by their numbers, obstacles first.
 
@@ -42,10 +42,10 @@ def nearest_pairs(
 
     Args:
         pairs: Every pair, of an arm or a robot.
+        outer: Which of them are with an obstacle, shape (n_pairs,).
         least: What is proved of them.
     """
-    of_links = np.array([not pair.obstacle for pair in pairs], bool)
-    seen = np.flatnonzero(np.isfinite(least.upper))
+    of_links, seen = ~outer, np.flatnonzero(np.isfinite(least.upper))
 
     def nearest(some: IntArray) -> IntArray:
         return some[np.lexsort((least.upper[some], of_links[some]))][:CLOSEST]

@@ -77,7 +77,7 @@ class ClearanceProof:
     sent: int
 
     @property
-    def pairs(self) -> tuple[Pair, ...]:
+    def pairs(self) -> Sequence[Pair]:
         """Every pair."""
         return self.motion.asked.pairs
 

@@ -1,6 +1,6 @@
 """What a clearance proof comes to: a row for the obstacles and one for the links."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, isnan, nan
 from typing import Final
@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import OutOfTime
-from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import Deadline
@@ -32,6 +32,7 @@ class Evidence:
 
     Args:
         pairs: Every pair.
+        outer: Which of them are with an obstacle, shape (n_pairs,).
         least: Their least clearances.
         counts: What was judged of each by verdict, shape (n_pairs, 3).
         deepest: Whether a pair, by its number, is found as deep as is measured.
@@ -40,7 +41,8 @@ class Evidence:
         contacts: Where the clearance is first lost.
     """
 
-    pairs: tuple[Pair, ...]
+    pairs: Sequence[Pair]
+    outer: BoolArray
     least: LeastClearances
     counts: IntArray
     deepest: Callable[[int, float], bool]
@@ -59,13 +61,12 @@ def clearance_checks(
         evidence: What is proved.
         late: When the proof had to end, where it did not in time.
     """
-    of_obstacles = np.array([bool(pair.obstacle) for pair in evidence.pairs], bool)
     rows = []
     for kind, name, needed in (
         (True, OBSTACLES, problem.required_clearance),
         (False, LINKS, problem.required_self_clearance),
     ):
-        mine = np.flatnonzero(of_obstacles == kind)
+        mine = np.flatnonzero(evidence.outer == kind)
         if not mine.size:
             continue
         row = _row(Check(name, Verdict.CERTIFIED, 0, nan, needed, "m"), evidence, mine)

@@ -6,6 +6,7 @@ looked at first; of a swept polygon Coal is told the faces.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -28,6 +29,20 @@ class CoalBody:
 
     geometry: Any
     pose: Any
+
+    @cached_property
+    def place(self) -> tuple[FloatArray, FloatArray]:
+        """R, shape (3, 3), and p, shape (3,), of its pose; [-], [m]."""
+        return self.pose.getRotation(), self.pose.getTranslation()
+
+    @cached_property
+    def ball(self) -> tuple[FloatArray, float]:
+        """Middle, shape (3,), and radius of Coal's ball about it, inf for none; [m]."""
+        self.geometry.computeLocalAABB()
+        radius = float(self.geometry.aabb_radius)
+        if not radius < np.inf:  # a half-space, whose middle is out of all bounds
+            return np.zeros(3), np.inf
+        return self.pose.transform(self.geometry.aabb_center), radius
 
 
 def placed(

@@ -4,6 +4,7 @@ Whoever asks has the frames' poses, from Pinocchio where it can.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,8 +81,8 @@ class _Parts(NamedTuple):
         return cls(
             np.cumsum([0, *map(len, clouds_too)]),
             [part.geometry for part in parts],
-            np.array([part.pose.getRotation() for part in parts]).reshape(-1, 3, 3),
-            np.array([part.pose.getTranslation() for part in parts]).reshape(-1, 3),
+            np.array([part.place[0] for part in parts]).reshape(-1, 3, 3),
+            np.array([part.place[1] for part in parts]).reshape(-1, 3),
         )
 
 
@@ -98,6 +99,17 @@ class CoalShapes:
     ) -> None:
         self._bodies, self._frames = bodies, np.array(frames, np.int64)
         self._parts = _Parts.of(bodies)
+
+    @cached_property
+    def _balls(self) -> tuple[FloatArray, FloatArray]:
+        """Coal's ball about each body of one part in its frame, NaN of others; [m]."""
+        found = []
+        for body in self._bodies:
+            parts = body if isinstance(body, tuple) else ()
+            none = np.full(3, np.nan), np.nan
+            found.append(parts[0].ball if len(parts) == 1 else none)
+        middles, radii = zip(*found, strict=True)
+        return np.array(middles), np.array(radii)
 
     def untold(self, names: Sequence[str]) -> str:
         """Which bodies, by the names of all, Coal says nothing of; "" where it does."""
@@ -123,6 +135,28 @@ class CoalShapes:
         partners = [self._bodies[k] for k in sides.other[pair].tolist()]
         calls = zip(pair.tolist(), shapes, *places, partners, strict=True)
         return Distances(*measure_each(calls, len(sides.row)))
+
+    def between_balls(
+        self, poses: FloatArray, sides: Sides
+    ) -> tuple[FloatArray, FloatArray]:
+        """The least and the most that each pair is apart, by Coal's balls about bodies.
+
+        Args:
+            poses: As for `distances`.
+            sides: The pairs.
+
+        Returns:
+            Shape (m,) each; NaN where a body is of several parts or none; [m].
+        """
+        middles, radii = self._balls
+        ends = []
+        for body in (sides.one, sides.other):
+            frame = poses[sides.row, self._frames[body]]
+            turned = np.einsum("nij,nj->ni", frame[..., :3], middles[body])
+            ends.append(turned + frame[..., 3])
+        away = np.linalg.norm(ends[1] - ends[0], axis=1)
+        both = radii[sides.one] + radii[sides.other]
+        return away - both, away + both
 
     def _places(
         self, poses: FloatArray, sides: Sides, part: IntArray

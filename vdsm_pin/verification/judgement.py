@@ -75,7 +75,7 @@ class Judgement:
         asked, least = self.proof.motion.asked, self.least
         return {
             k: replace(one, deeper=_is_deepest(asked, least, k, one.upper))
-            for k, one in nearest_pairs(asked.pairs, least).items()
+            for k, one in nearest_pairs(asked.pairs, asked.outer, least).items()
         }
 
 
@@ -110,6 +110,7 @@ def judge_clearance(
         met = extras.take("first contact", (), contacts_of, *about)
     evidence = Evidence(
         pairs=asked.pairs,
+        outer=asked.outer,
         least=proof.least,
         counts=proof.counts,
         deepest=partial(_is_deepest, asked, proof.least),

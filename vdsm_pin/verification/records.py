@@ -1,5 +1,6 @@
 """What a verification returns: verdicts, rows of evidence, closest approaches."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import inf, isfinite, nan
@@ -239,7 +240,7 @@ class Verification(Summarised):
 
     problem: AnyProblem
     trajectory: AnyMotion
-    pairs: tuple[Pair, ...]
+    pairs: Sequence[Pair]
     checks: tuple[Check, ...]
     approaches: tuple[ClosestApproach, ...]
     profile: ClearanceProfile
