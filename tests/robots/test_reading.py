@@ -18,8 +18,9 @@ from vdsm_pin.robots.cell import cell_of
 from vdsm_pin.robots.files import MeshCover, RobotFiles, solids_of
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.second_opinion import link_shapes, pose_difference
+from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.verification.coal_pairs import link_shapes
 
 SRDF = """<robot name="two">
   <virtual_joint name="cart" type="planar" parent_frame="w" child_link="base"/>
@@ -303,7 +304,7 @@ def test_covers_of_a_mesh_hold_all_of_it(tmp_path: Path) -> None:
                 for piece in arm.pieces
             )
         )
-        assert all(shapes is not None for shapes in link_shapes(robot))
+        assert all(shapes is not None for shapes in link_shapes(robot.bodies))
     assert len(robot.bodies) == 3
     assert far[0] <= 0.0  # the hull fills the gap, two hulls do not
     assert far[1] > 0.1

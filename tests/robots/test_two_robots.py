@@ -25,10 +25,10 @@ from vdsm_pin.robots.by_itself import POSES
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.files import HULLS, MeshCover, RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
-from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.verification.coal_pairs import link_shapes
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.records import Verdict
 
@@ -274,7 +274,9 @@ def test_random_pairs_keep_what_dense_samples_by_coal_say(
     poses = [r.poses(m.at(at)) for r, m in zip(robots, motions, strict=True)]
     frames = [body.frame for body in robots[0].bodies]
     frames += [body.frame + poses[0].shape[1] for body in robots[1].bodies]
-    coal = CoalShapes(frames, [*link_shapes(robots[0]), *link_shapes(robots[1])])
+    coal = CoalShapes(
+        frames, [*link_shapes(robots[0].bodies), *link_shapes(robots[1].bodies)]
+    )
     placed = np.concatenate([poses[0], other @ poses[1]], axis=1)[:, :, :3]
     rows, numbers = np.arange(len(at)), [body.name for body in robots[1].bodies]
     for k, pair in enumerate(found.pairs):

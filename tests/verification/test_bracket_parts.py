@@ -377,7 +377,7 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
         np.random.default_rng([10, seed]),
         replace(problem(), required_clearance=0.5),
     )
-    pairs = CoalPairs(asked)
+    pairs = CoalPairs(arm_assembly(asked))
     of_obstacles = np.flatnonzero(pairs.other >= pairs.n_own)
     parts, expected = [], dict[tuple[int, int], tuple[Any, ...]]()
     for part in range(3):

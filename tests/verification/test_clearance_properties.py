@@ -25,14 +25,14 @@ from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.coal_pairs import arm_shapes
+from vdsm_pin.verification.coal_pairs import assembly_shapes
 from vdsm_pin.verification.coal_shapes import Sides
 from vdsm_pin.verification.pinocchio_arm import PinocchioArm, load_arm
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
+from vdsm_pin.verification.task import arm_assembly
 
 N_LINKS, RADIUS, SAMPLES = 3, 0.05, 1000
 LENGTHS = np.array([0.5, 0.4, 0.3])
@@ -145,10 +145,10 @@ def shown(bounds: FloatArray) -> FloatArray:
 
 def by_coal(obstacle: scene.Obstacle, q: FloatArray) -> FloatArray:
     """Coal's distance of every link at every row, shape (n_rows, N); [m]."""
-    poses = np.tile(np.eye(3, 4), (len(q), N_LINKS + 2, 1, 1))
-    poses[:, 1:-1] = robot().poses(q[:, 0], q[:, 1::2], q[:, 2::2])[:, :N_LINKS]
+    poses = np.tile(np.eye(3, 4), (len(q), 2 * N_LINKS + 2, 1, 1))
+    poses[:, 3::2] = robot().poses(q[:, 0], q[:, 1::2], q[:, 2::2])[:, :N_LINKS]
     row, link = (a.ravel() for a in np.indices((len(q), N_LINKS)))
-    shapes = arm_shapes(problem_of(obstacle), NO_LIMIT)
+    shapes = assembly_shapes(arm_assembly(problem_of(obstacle)))
     other = np.full(link.size, N_LINKS)
     found = shapes.distances(poses, Sides(row, link, other)).distance
     return found.reshape(len(q), N_LINKS)

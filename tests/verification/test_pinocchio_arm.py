@@ -15,6 +15,7 @@ from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput, VerificationFailed
+from vdsm_pin.verification.coal_hulls import coal_parts
 from vdsm_pin.verification.pinocchio_arm import load_arm, read_arm
 from vdsm_pin.verification.pinocchio_frames import PinocchioFrames
 
@@ -113,14 +114,15 @@ def test_link_frames_point_along_the_links() -> None:
 
 
 def test_capsules_lie_between_the_joint_centres() -> None:
-    robot = load_arm(HRM8)
-    for capsule, pose, length in zip(
-        robot.capsules, robot.T_link_capsule, HRM8.link_lengths, strict=True
-    ):
-        half = pose[:3, 2] * capsule.halfLength
-        np.testing.assert_allclose(pose[:3, 3] - half, [0, 0, 0], atol=1e-16)
-        np.testing.assert_allclose(pose[:3, 3] + half, [length, 0, 0], atol=1e-16)
-        assert capsule.radius == HRM8.link_radius
+    pieces = [body.piece for body in HRM8.convex_bodies]
+    parts = coal_parts(pieces)
+    assert parts is not None
+    for part, length in zip(parts, HRM8.link_lengths, strict=True):
+        middle, turn = part.pose.getTranslation(), part.pose.getRotation()
+        half = turn[:, 2] * part.geometry.halfLength
+        np.testing.assert_allclose(middle - half, [0, 0, 0], atol=1e-16)
+        np.testing.assert_allclose(middle + half, [length, 0, 0], atol=1e-16)
+        assert part.geometry.radius == HRM8.link_radius
 
 
 def test_answers_of_one_call_survive_the_next() -> None:

@@ -155,7 +155,7 @@ def test_each_step_that_may_be_long_asks_the_clock() -> None:
         "_look",
         "_smallest",
         "_Judge.__call__",
-        "arm_shapes.<locals>.shape",
+        "assembly_shapes.<locals>.shape",
         "check_cables",
         "check_fk",
         "find_counterexamples",

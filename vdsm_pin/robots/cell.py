@@ -19,11 +19,10 @@ from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.other_robots import read_other
 from vdsm_pin.robots.scene_files import read_scene_with_files
-from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.assembly import Assembly, obstacle_growth
-from vdsm_pin.verification.coal_bodies import coal_obstacle
+from vdsm_pin.verification.coal_pairs import assembly_shapes
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 
 
@@ -138,9 +137,7 @@ class Cell(AnyProblem):
     @cached_property
     def coal(self) -> CoalShapes:
         """The bodies as Coal has them."""
-        things = map(coal_obstacle, self.scene.obstacles)
-        frames = [body.frame for body in self.asked.bodies]
-        return CoalShapes(frames, [*link_shapes(self.robot), *things])
+        return assembly_shapes(self.asked)
 
     def sides(
         self, one: IntArray, other: IntArray, row: IntArray | None = None

@@ -1,4 +1,4 @@
-"""Pinocchio and Coal about a robot: poses from the same URDF, distances of pairs."""
+"""Pinocchio about a robot: poses from the same URDF."""
 
 import xml.etree.ElementTree as ET
 from functools import lru_cache
@@ -8,7 +8,6 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.verification.coal_hulls import CoalBody, coal_parts
 from vdsm_pin.verification.pinocchio_frames import PinocchioFrames, read_model
 
 KEPT: Final = 8
@@ -115,9 +114,3 @@ def _bare(text: str) -> str:
                 joint, "limit", lower="0", upper="0", effort="0", velocity="0"
             )
     return ET.tostring(document, encoding="unicode")
-
-
-@lru_cache(maxsize=KEPT)
-def link_shapes(robot: Robot) -> tuple[tuple[CoalBody, ...] | None, ...]:
-    """Coal's shapes of each body of a robot, in its link's frame."""
-    return tuple(coal_parts(body.pieces) for body in robot.bodies)

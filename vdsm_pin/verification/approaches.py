@@ -1,6 +1,6 @@
 """The pairs that come nearest in a motion."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import nan
 from typing import Final
@@ -22,12 +22,13 @@ CLOSEST: Final = 10
 def closest_approaches(
     problem: PlanningProblem,
     trajectory: Trajectory,
-    nearest: Iterable[ClosestApproach],
-) -> tuple[ClosestApproach, ...]:
+    nearest: Mapping[int, ClosestApproach],
+) -> dict[int, ClosestApproach]:
     """The pairs that come nearest in a snake arm's motion, with places along links."""
-    return tuple(
-        replace(near, station=_station(problem, trajectory, near)) for near in nearest
-    )
+    return {
+        k: replace(near, station=_station(problem, trajectory, near))
+        for k, near in nearest.items()
+    }
 
 
 def nearest_pairs(

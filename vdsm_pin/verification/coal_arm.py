@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.tree import link_frame
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.geometry.row_bounds import coarse_bounds, link_gaps, row_brackets
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -23,9 +24,10 @@ from vdsm_pin.problem.scene import Moving
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.coal_pairs import CoalPairs, arm_shapes
+from vdsm_pin.verification.coal_pairs import CoalPairs, assembly_shapes
 from vdsm_pin.verification.coal_shapes import Sides, disagreement
 from vdsm_pin.verification.pinocchio_arm import load_arm
+from vdsm_pin.verification.task import arm_assembly
 
 CHUNK_BOUNDS: Final = 1 << 17
 """Coarse bounds held in memory at a time: rows times links times partners."""
@@ -99,9 +101,10 @@ class CoalArm:
         *,
         links: bool = True,
     ) -> None:
-        self.problem, self.pairs = problem, CoalPairs(problem)
+        self.problem, self._asked = problem, arm_assembly(problem)
+        self.pairs = CoalPairs(self._asked)
         self._model = load_arm(problem.manipulator)
-        self._shapes = arm_shapes(problem, deadline)
+        self._shapes = assembly_shapes(self._asked, deadline)
         self._radii = problem.manipulator.axis_radii
         # Partners with coarse bounds: obstacles at rest, then links and tool.
         moves = [isinstance(one, Moving) for one in problem.scene.obstacles]
@@ -261,15 +264,19 @@ class CoalArm:
     def _poses(
         self, now: tuple[FloatArray, FloatArray, FloatArray], times: FloatArray | None
     ) -> FloatArray:
-        """T_base_frame as `arm_shapes` counts, shape (n_rows, n_frames, 3, 4); [m]."""
-        n, moving = self.problem.manipulator.n_links, self.problem.scene.moving
-        poses = np.zeros((len(now[0]), n + 2 + len(moving), 3, 4))
+        """T_base_frame of the tree's frames, by Pinocchio, (n_rows, n_frames, 3, 4).
+
+        Those between yaw and pitch of a joint carry nothing; the feed's does not turn.
+        """
+        n, asked = self.problem.manipulator.n_links, self._asked
+        poses = np.zeros((len(now[0]), asked.tree.n_frames, 3, 4))
         poses[..., :3] = np.eye(3)
-        poses[:, 1 : n + 1] = self._model.poses(*now)[:, :n]
-        poses[:, n + 1, :, 3] = poses[:, 1, :, 3]
-        if times is not None:
-            for k, one in enumerate(moving, start=n + 2):
-                poses[:, k] = one.poses(times)[:, :3]
+        links = self._model.poses(*now)[:, :n]
+        poses[:, link_frame(0), :, 3] = links[:, 0, :, 3]
+        poses[:, link_frame(1) : link_frame(n) + 1 : 2] = links
+        for body, one in enumerate(asked.scene.obstacles, start=len(asked.own)):
+            if isinstance(one, Moving) and times is not None:
+                poses[:, asked.bodies[body].frame] = one.poses(times)[:, :3]
         return poses
 
 

@@ -1,11 +1,10 @@
 """Coal's distances against the proof: a second opinion on every clearance.
 
 Coal proves nothing, so agreement certifies no clearance, and a disagreement leaves the
-motion undecided. A mesh that a link carries is proved clear by hulls around it, which
-are nearer than its triangles: there Coal can contradict the lower bound alone.
+motion undecided. Of a mesh that a link carries both measure the hulls around it.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Final
@@ -67,38 +66,41 @@ class CoalLog:
     """What Coal is asked besides its rows, and all that it answers.
 
     Args:
-        approaches: The closest approaches, measured at their moments.
+        approaches: The closest approaches by their pairs' numbers, measured at their
+            moments.
         enclosing: Names of the meshes that the arm is inside of; Coal measures to
             their surface alone, which is no clearance, so no distance is kept.
     """
 
     def __init__(
-        self, approaches: Sequence[ClosestApproach] = (), enclosing: Sequence[str] = ()
+        self,
+        approaches: Mapping[int, ClosestApproach] | None = None,
+        enclosing: Sequence[str] = (),
     ) -> None:
-        self.approaches, self._enclosing = list(approaches), tuple(enclosing)
+        self.approaches, self._enclosing = dict(approaches or {}), tuple(enclosing)
         self._parts: list[tuple[IntArray, IntArray, FloatArray]] = []
 
     def answers(self, arm: CoalArm, trajectory: Trajectory) -> Iterator[CoalDistances]:
-        """Coal's answers at the closest approaches; none of parts of a body."""
-        for k, near in enumerate(self.approaches):
-            pair = np.array([arm.pairs.number(near.pair)])
-            if arm.pairs.judged[pair] < 0 or near.pair.obstacle in self._enclosing:
+        """Coal's answers at the closest approaches."""
+        for k, near in self.approaches.items():
+            if near.pair.obstacle in self._enclosing:
                 continue
-            found = arm.measured(trajectory, np.array([near.moment]), pair)
+            found = arm.measured(trajectory, np.array([near.moment]), np.array([k]))
             self.approaches[k] = replace(near, coal=float(found.distance[0]))
             if not np.isfinite(found.upper[0]):  # as the proof has it
-                upper = np.where(arm.pairs.covered[pair], np.inf, near.upper)
-                found = replace(found, lower=np.array([near.lower]), upper=upper)
+                bracket = np.array([near.lower]), np.array([near.upper])
+                found = replace(found, lower=bracket[0], upper=bracket[1])
             yield found
 
     def keep(self, arm: CoalArm, found: CoalDistances) -> None:
-        """Receive distances at waypoints; those of several parts are no part's."""
-        names, judged = arm.pairs.names, arm.pairs.judged[found.pair]
-        around = [names.index(name, arm.pairs.n_own) for name in self._enclosing]
+        """Receive distances at waypoints."""
+        around = [
+            arm.pairs.names.index(name, arm.pairs.n_own) for name in self._enclosing
+        ]
         usable = np.where(np.isfinite(found.distance), found.distance, np.nan)
-        wanted = (judged >= 0) & ~np.isin(arm.pairs.other[found.pair], around)
+        wanted = ~np.isin(arm.pairs.other[found.pair], around)
         row = found.moment.astype(np.int64)
-        self._parts.append((row[wanted], judged[wanted], usable[wanted]))
+        self._parts.append((row[wanted], found.pair[wanted], usable[wanted]))
 
     def rows(self) -> CoalRows:
         """All distances at waypoints, in the order in which they came."""
@@ -174,7 +176,7 @@ def _kept(
         log.keep(arm, found)
         if proved is not None:
             row = found.moment.astype(np.int64)
-            lower = arm.pairs.lowers(proved, row, found.pair)
+            lower = proved.at(row, found.pair)
             yield replace(found, lower=np.maximum(found.lower, lower))
         else:
             yield found

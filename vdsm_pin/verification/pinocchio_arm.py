@@ -1,7 +1,7 @@
-"""An arm as Pinocchio reads it from its URDF, and Coal's capsules of its links."""
+"""An arm as Pinocchio reads it from its URDF."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -9,13 +9,9 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput, VerificationFailed
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of
 from vdsm_pin.verification.pinocchio_frames import PinocchioFrames, read_model
-
-LYING: Final = frozen([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-"""R_link_capsule: a capsule of Coal stands along z, a link lies along x."""
-
 
 _last: list["PinocchioArm | None"] = [None]
 """The last arm that was loaded: most problems of a batch have one arm. Nobody changes
@@ -30,16 +26,11 @@ class PinocchioArm:
         manipulator: The arm it was written from.
         urdf_sha256: Hash of the URDF's bytes.
         frames: Of links 1 to N (origin at O_i, x axis along link i) and of the tip.
-        capsules: One coal.Capsule per link and one for the tool, along its own z axis.
-        T_link_capsule: Pose of each capsule in its link frame, shape (n_axes, 4, 4);
-            [m] in its last column.
     """
 
     manipulator: Manipulator
     urdf_sha256: str
     frames: PinocchioFrames
-    capsules: tuple[Any, ...]
-    T_link_capsule: FloatArray
 
     @property
     def model(self) -> Any:
@@ -89,7 +80,7 @@ def load_arm(manipulator: Manipulator) -> PinocchioArm:
         manipulator: The arm.
 
     Returns:
-        The model, with exact Coal capsules for the links.
+        The model.
 
     Raises:
         VerificationFailed: If Pinocchio does not find the arm's joints in the URDF.
@@ -109,7 +100,7 @@ def read_arm(manipulator: Manipulator, text: str) -> PinocchioArm:
     """The model of an arm from URDF text.
 
     Lengths, axes and shapes in it are not looked at: `fk` holds the joint centres of
-    every row against the closed form, and the capsules are made of the arm's sizes.
+    every row against the closed form.
 
     Args:
         manipulator: The arm.
@@ -119,8 +110,6 @@ def read_arm(manipulator: Manipulator, text: str) -> PinocchioArm:
         InvalidInput: If the document is not sound.
         VerificationFailed: If it does not have the arm's joints and links.
     """
-    import coal
-
     validate_urdf(text)
     model, links = read_model(text), range(1, manipulator.n_links + 1)
     angles = [f"{kind}{i}" for i in links for kind in ("alpha", "theta")]
@@ -128,15 +117,8 @@ def read_arm(manipulator: Manipulator, text: str) -> PinocchioArm:
     if list(model.names) != expected:
         message = f"Pinocchio's joints are {list(model.names)}, expected {expected}"
         raise VerificationFailed(message)
-    starts, ends = manipulator.axis_spans.T
-    radii = manipulator.axis_radii
-    T_link_capsule = np.tile(np.eye(4), (radii.size, 1, 1))
-    T_link_capsule[:, :3, :3] = LYING
-    T_link_capsule[:, 0, 3] = (starts + ends) / 2.0
     return PinocchioArm(
         manipulator=manipulator,
         urdf_sha256=sha256_of([text.encode()]),
         frames=PinocchioFrames.of(model, [*(f"link{i}" for i in links), "tip"]),
-        capsules=tuple(map(coal.Capsule, radii.tolist(), (ends - starts).tolist())),
-        T_link_capsule=frozen(T_link_capsule),
     )

@@ -84,10 +84,10 @@ def verify(
     found = judge_clearance(problem, trajectory, proof, places, extras, deadline)
     if sinks and proof.sent < motion.n_intervals:
         extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
-    tip, nearest = check_tip(problem, trajectory), found.nearest.values()
+    tip = check_tip(problem, trajectory)
     meshes = by_mesh(motion.asked, places).items()
     around = [name for name, where in meshes if where.side is Side.INSIDE]
-    log = CoalLog(closest_approaches(problem, trajectory, nearest), around)
+    log = CoalLog(closest_approaches(problem, trajectory, found.nearest), around)
     args = problem, trajectory, deadline
     checks = [
         *guarded(fk.NAME, fk.check_fk, model, problem, trajectory, centres, deadline),
@@ -107,7 +107,7 @@ def verify(
         trajectory=trajectory,
         pairs=proof.pairs,
         checks=tuple(checks),
-        approaches=tuple(log.approaches),
+        approaches=tuple(log.approaches.values()),
         profile=found.profile,
         tip_deviation=tip.deviation,
         coverage=tip.coverage,

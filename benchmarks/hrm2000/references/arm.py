@@ -18,6 +18,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.coal_bodies import coal_bodies
+from vdsm_pin.verification.coal_hulls import CoalBody, coal_parts
 from vdsm_pin.verification.pinocchio_arm import PinocchioArm
 
 BETWEEN = 5e-4
@@ -57,6 +58,12 @@ def wanted(problem: PlanningProblem) -> Wanted:
     )
 
 
+def placement(body: CoalBody) -> pin.SE3:
+    """Where a body of Coal is in its frame."""
+    turn, shift = body.pose.getRotation(), body.pose.getTranslation()
+    return pin.SE3(np.array(turn), np.array(shift))
+
+
 class Arm:
     """The arm at joint values q = (x0, alpha_1, theta_1, ...)."""
 
@@ -65,6 +72,9 @@ class Arm:
     ) -> None:
         self.problem, self.robot, self.clearance = problem, robot, clearance
         self.data, arm = robot.model.createData(), problem.manipulator
+        links = coal_parts([body.piece for body in arm.convex_bodies[: arm.n_links]])
+        assert links is not None  # Coal takes capsules
+        self.links = links
         self.p_link_tip = np.array([arm.link_lengths[-1], 0.0, 0.0])
         self.n, self.nq = arm.n_links, 1 + 2 * arm.n_links
         self.cone, box = arm.max_link_angle, arm.max_joint_angle
@@ -143,12 +153,12 @@ class Arm:
         request = coal.DistanceRequest()
         for link in np.flatnonzero(room < PUSH_WITHIN):
             joint = 3 + 2 * int(link)  # universe, rail, then yaw and pitch of each link
-            pose = self.data.oMi[joint] * pin.SE3(self.robot.T_link_capsule[link])
+            pose = self.data.oMi[joint] * placement(self.links[link])
             place = coal.Transform3s(pose.rotation, pose.translation)
             for body in self.bodies:
                 result = coal.DistanceResult()
                 gap = coal.distance(
-                    self.robot.capsules[link], place, body.geometry, body.pose,
+                    self.links[link].geometry, place, body.geometry, body.pose,
                     request, result,
                 )  # fmt: skip
                 if gap < PUSH_WITHIN:

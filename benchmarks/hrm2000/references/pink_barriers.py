@@ -6,7 +6,7 @@ import pinocchio as pin
 from pink.barriers import Barrier, SelfCollisionBarrier
 from pink.tasks import FrameTask
 
-from benchmarks.hrm2000.references.arm import Arm, Rows, wanted
+from benchmarks.hrm2000.references.arm import Arm, Rows, placement, wanted
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
@@ -45,15 +45,13 @@ class ConeBarrier(Barrier):
 
 def bodies(arm: Arm) -> pin.GeometryModel:
     """Links and obstacles as Pinocchio's geometry, every pair of one and the other."""
-    model, robot = pin.GeometryModel(), arm.robot
-    links = []
-    for i, capsule in enumerate(robot.capsules):
-        place = pin.SE3(robot.T_link_capsule[i])
-        link = pin.GeometryObject(f"link{i}", 3 + 2 * i, place, capsule)
+    model, links = pin.GeometryModel(), []
+    for i, body in enumerate(arm.links):
+        place = placement(body)
+        link = pin.GeometryObject(f"link{i}", 3 + 2 * i, place, body.geometry)
         links.append(model.addGeometryObject(link))
     for k, body in enumerate(arm.bodies):
-        turn, shift = body.pose.getRotation(), body.pose.getTranslation()
-        place = pin.SE3(np.array(turn), np.array(shift))
+        place = placement(body)
         obstacle = pin.GeometryObject(f"obstacle{k}", 0, place, body.geometry)
         number = model.addGeometryObject(obstacle)
         for link in links:
