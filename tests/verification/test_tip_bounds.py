@@ -160,3 +160,27 @@ def test_of_a_single_row_the_deviation_is_its_distance() -> None:
             continue
         assert gap < report.deviation <= gap + 1e-10
         assert (row.count, row.moment, row.worst) == (1, 0, report.deviation)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_chord_is_off_most_at_its_ends_or_at_corners_on_its_way(
+    seed: int, closed: bool
+) -> None:
+    """Past the seam too, forwards and backwards; oracle: 20,001 moments."""
+    rng, shares = np.random.default_rng([14, seed]), np.linspace(0.0, 1.0, 20_001)
+    for _ in range(12):
+        corners = rng.normal(size=(int(rng.integers(3, 7)), 3))
+        path = DesiredPath(corners[0], corners, closed=closed)
+        begin, run = rng.uniform(0.0, path.length), rng.uniform(-0.5, 0.5) * path.length
+        if not closed:
+            run = np.clip(begin + run, 0.0, path.length) - begin
+        tips = np.array([rng.normal(size=3), rng.normal(size=3)])
+        at = wrapped(path, begin + shares * run)
+        chord = tips[0] + shares[:, None] * (tips[1] - tips[0])
+        off = np.linalg.norm(chord - path.at(at), axis=1)
+        asked = path, tips, np.array([begin]), np.array([run]), np.array([0])
+        (inner,) = tip._corner_deviation(*asked)
+        most = max(inner, off[0], off[-1])
+        assert most == pytest.approx(off.max(), abs=2e-3)
+        assert most >= off.max() - 1e-9
