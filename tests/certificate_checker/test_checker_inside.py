@@ -300,6 +300,16 @@ def test_tetrahedra_of_which_a_ray_meets_an_edge_are_wound_round_exactly() -> No
     assert (counts > 5).all()
 
 
+def test_a_mesh_that_closes_by_triangles_in_line_has_others_of_two_corners() -> None:
+    """Those fill the gap beside an edge that is split, these are left out."""
+    a, b, c = BOX[0]
+    middle = (a + b) / 2.0
+    split = np.array([[a, middle, c], [middle, b, c], [a, b, middle]])
+    surface = Surface(np.concatenate([split, BOX[1:], [[a, a, b], [c, c, c]]]))
+    assert surface.not_outside([0.1, 0.2, 0.3], 0.01) == "it is inside"
+    assert surface.not_outside([5.1, 0.2, 0.3], 0.01) == ""
+
+
 def test_a_cavity_in_a_body_that_is_written_twice_is_none() -> None:
     """As written the mesh closes and winds 2 - 1 times round the middle."""
     thrice = np.concatenate([cube(6), cube(6), cube(5, sense=-1)])

@@ -98,6 +98,16 @@ def test_a_point_near_a_tip_is_inside_wherever_the_tip_stands_in_its_faces(
         assert where(solid, point=1.2 * sense * tip).side is Side.OUTSIDE
 
 
+def test_a_mesh_that_closes_by_triangles_in_line_has_others_of_two_corners() -> None:
+    """Those fill the gap beside an edge that is split, these are left out."""
+    a, b, c = box(5.0)[0]
+    middle = (a + b) / 2.0
+    split = np.array([[a, middle, c], [middle, b, c], [a, b, middle]])
+    parts = split, box(5.0)[1:], np.array([[a, a, b], [c, c, c]])
+    assert where(*parts).side is Side.INSIDE
+    assert where(*parts, point=np.array([9.0, 0.1, 0.2])).side is Side.OUTSIDE
+
+
 def test_seams_are_as_many_as_an_edge_lacks_partners_of_its_sense() -> None:
     """Two cubes that meet at an edge, which both have forwards alone: it lacks two."""
     ends, parts = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]), []
