@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flint import arb
 
-from vdsm_pin.certificate_checker.balls import Ball, column, norm
+from vdsm_pin.certificate_checker.balls import Ball, column, cross, dot, norm
 from vdsm_pin.certificate_checker.motion import Branch, Interval, Slices
 from vdsm_pin.certificate_checker.solids import Body, Solid, away
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
@@ -128,3 +128,12 @@ def test_bounds_lie_above_what_rounding_loses_of_them() -> None:
     corners[0] -= (corners[0].min(axis=0) + corners[0].max(axis=0)) / 2.0
     corners[0, :2] = [-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]  # their middle is 0
     assert arb(away(corners[0] / 8.0, 0.5)) > exact(corners[0, 1]) / 8 + arb(0.5)
+
+
+def test_products_of_balls_are_those_of_vectors() -> None:
+    for a, b in np.random.default_rng(2).normal(size=(20, 2, 3)):
+        one, other = column(*a), column(*b)
+        assert float(dot(one, other)) == pytest.approx(a @ b)
+        found = [float(x) for x in cross(one, other).entries()]
+        assert found == pytest.approx(np.cross(a, b).tolist())
+        assert float(norm(one)) == pytest.approx(np.linalg.norm(a))

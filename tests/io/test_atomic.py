@@ -118,3 +118,12 @@ def test_killing_the_writer_leaves_the_old_file_or_the_new_one(tmp_path: Path) -
         assert len(text) == 200_000
         assert len(set(text)) == 1
         path.unlink()
+
+
+def test_a_library_without_room_is_no_file_that_cannot_be_written() -> None:
+    lost = OSError("libx.so: failed to map segment from shared object")
+    with pytest.raises(MemoryError, match="a library has no room"), writing("a"):
+        raise lost
+    other = OSError("no space")
+    with pytest.raises(CannotWrite), writing("a"):
+        raise other

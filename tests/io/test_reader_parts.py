@@ -1,5 +1,6 @@
 """Parts of readers by themselves; oracle: the rule of each, written out."""
 
+import json
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,8 +11,12 @@ import pytest
 import yaml
 
 from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io import trajectory_messages
+from vdsm_pin.io.obstacle_schema import SphereModel, with_field
+from vdsm_pin.io.places import Place
 from vdsm_pin.io.problem_errors import LONGEST_SHOWN, _entries, _location, _shown
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.tables import Table
 from vdsm_pin.io.urdf_arm import _Reading
 
@@ -261,3 +266,61 @@ def test_a_number_ends_where_its_quotes_do(row: str, said: str) -> None:
         assert said in str(caught.value)
     else:
         assert table.all_rows().tolist() == [[1.0, 2.0]]
+
+
+ARM = {"link_lengths": [0.3, 0.2], "link_radius": 0.03}
+ARM |= {"max_link_angle_deg": 60, "max_joint_angle_deg": 50}
+MATE = "waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,alpha2_rad,theta2_rad,time_s"
+MATE += "\n0,0,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0,1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (MATE, ""),
+        (MATE.replace("0,0,0\n", "0,x,0\n"), "mate.csv"),
+        (MATE.replace("alpha2_rad", "alpha3_rad"), "mate.csv"),
+        ("", "mate.csv"),
+    ],
+)
+def test_a_damaged_trajectory_of_another_arm_is_told_by_its_place(
+    text: str, said: str, tmp_path: Path
+) -> None:
+    mate = {"name": "mate", "manipulator": ARM, "trajectory": "mate.csv"}
+    problem = {"vdsm_problem": 1, "length_unit": "m", "manipulator": ARM}
+    problem |= {"required_clearance": 0, "others": [mate | {"base": {}}]}
+    file = tmp_path / "p.yaml"
+    file.write_text(json.dumps(problem))
+    (tmp_path / "mate.csv").write_text(text)
+    if not said:
+        assert len(read_problem(file).scene.obstacles) == 2
+        return
+    with pytest.raises(InvalidFile) as caught:
+        read_problem(file)
+    assert str(caught.value).startswith(f"{file}: others[0].trajectory")
+    assert said in str(caught.value)
+
+
+def test_a_shape_with_more_fields_is_named_and_described_as_it_is() -> None:
+    class More(FileModel):
+        link: int
+
+    made = with_field(SphereModel, More, "Body")
+    assert made.__name__ == "SphereBody"
+    assert made.__doc__ == SphereModel.__doc__
+    assert {*made.model_fields} == {*SphereModel.model_fields, "link"}
+
+
+def test_more_points_than_a_motion_may_have_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(trajectory_messages, "MAX_ROWS", 3)
+    for count in (3, 4):
+        points = [{"positions": [0.0], "time_from_start": float(k)}
+                  for k in range(1, count + 1)]  # fmt: skip
+        message = Place.of("f", {"joint_names": ["a"], "points": points})
+        if count == 3:
+            assert len(trajectory_messages.of_message(message).q) == 3
+        else:
+            with pytest.raises(InvalidFile, match="has more than 3 points"):
+                trajectory_messages.of_message(message)

@@ -13,6 +13,7 @@ from vdsm_pin.io.source import (
     check_unchanged,
     naming,
     opened,
+    path_of,
     sha256_of_file,
 )
 
@@ -60,3 +61,10 @@ def test_an_error_names_the_file_unless_it_names_its_own() -> None:
         raise InvalidInput(message)
     with pytest.raises(InvalidFile, match=r"^b: is wrong$"), naming(Path("a")):
         raise InvalidFile(file="b", problem="is wrong")
+
+
+def test_what_names_no_file_is_told() -> None:
+    assert path_of("a/b") == path_of(Path("a/b")) == Path("a/b")
+    for value in (None, 7, b"a", ["a"]):
+        with pytest.raises(InvalidInput, match=f"found {type(value).__name__}$"):
+            path_of(value)
