@@ -7,6 +7,7 @@ import pytest
 
 from tests.robots.test_moving_beside_robots import along, cell_with, gaps
 from tests.robots.test_robots import write
+from vdsm_pin.proof import stretches
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.robots.cell import read_cell
 from vdsm_pin.robots.judgement import verify_robot
@@ -69,6 +70,27 @@ def test_contacts_with_two_walls_are_counted_together(tmp_path: Path) -> None:
     assert row.first_moment == pytest.approx(9.0 + ROOM / 0.45, abs=2e-6)
     assert row.last_moment == pytest.approx(42.0 - ROOM / 0.5, abs=2e-6)
     assert (row.too_close_intervals, row.too_close_stretches) == (4, 2)
+
+
+@pytest.mark.parametrize(("ways", "counted"), [(16, 32), (17, 0)])
+def test_of_contacts_in_very_many_intervals_the_first_is_told_alone(
+    ways: int, counted: int, tmp_path: Path
+) -> None:
+    """Balls in both bodies are looked for in 32 intervals, of more in none."""
+    row = slid(tmp_path, [*[0.0, 0.45] * ways, 0.0], 0.0)
+    assert row.first_moment == pytest.approx(ROOM / 0.45, abs=2e-6)
+    assert row.too_close_intervals == counted
+    assert np.isfinite(row.last_moment) == bool(counted)
+
+
+@pytest.mark.parametrize("most", [1, 1_000_000])
+def test_intervals_that_take_too_much_memory_are_not_counted(
+    most: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stretches, "MOST_BRACKETS", most)
+    row = slid(tmp_path, [0.0, 0.45, 0.0], 0.0)
+    assert row.first_moment == pytest.approx(ROOM / 0.45, abs=2e-6)
+    assert row.too_close_intervals == (0 if most == 1 else 2)
 
 
 def test_a_contact_all_along_begins_with_the_first_row_and_ends_with_the_last(

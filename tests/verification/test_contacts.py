@@ -287,3 +287,19 @@ def test_the_moment_of_most_depth_beside_another_is_found(
     still = np.array([start, start])
     assert moments(still, NO_LIMIT) == [start] * 6
     assert len(moments(span, Deadline(end=0.0))) == 5
+
+
+def test_bodies_whose_boxes_do_not_meet_seem_apart_and_others_as_deep_as_they_are() -> (
+    None
+):
+    """Of two balls on a line it is half of what they share, or of the gap."""
+    for gap in (-0.15, -0.01, 0.005):
+        other = np.eye(4)
+        other[0, 3] = 0.2 + gap
+        both = Placed([BALL]), Placed([BALL], other)
+        middle = np.array([0.1 + gap / 2.0, 0.0, 0.0])
+        found = contacts.seeming_depth(*both, middle)
+        expected = -gap / 2.0 if gap < 0.0 else -np.inf
+        assert found == pytest.approx(expected, abs=1e-6)
+        assert contacts.seeming_depth(*both, np.array([np.nan, 0, 0])) == -np.inf
+    assert contacts.common_ball(*both, np.array([np.inf, 0, 0]))[0] == 0.0

@@ -17,7 +17,7 @@ from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput, VerificationFailed
 from vdsm_pin.verification.coal_hulls import coal_parts
 from vdsm_pin.verification.pinocchio_arm import load_arm, read_arm
-from vdsm_pin.verification.pinocchio_frames import PinocchioFrames
+from vdsm_pin.verification.pinocchio_frames import PinocchioFrames, read_model
 
 HRM8 = built_in("hrm8")
 AGREEMENT = 1e-12
@@ -211,3 +211,8 @@ def test_frames_are_read_by_turns_and_by_threads_at_once() -> None:
     with ThreadPoolExecutor(4) as pool:
         for poses, found in zip(usual, pool.map(frames.poses, q), strict=True):
             np.testing.assert_array_equal(found, poses)
+
+
+def test_what_pinocchio_cannot_read_is_told() -> None:
+    with pytest.raises(VerificationFailed, match="Pinocchio refuses the URDF"):
+        read_model("<robot")
