@@ -16,7 +16,7 @@ from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.coal_arm import coal_reach
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import ArmVerification
-from vdsm_pin.verification.task import ArmPairs
+from vdsm_pin.verification.task import arm_assembly
 from vdsm_pin.verification.verify import verify
 
 if TYPE_CHECKING:  # few need repair or a certificate
@@ -43,7 +43,7 @@ class ArmSubject:
     @property
     def n_pairs(self) -> int:
         """Number of pairs that are judged."""
-        return ArmPairs(self.problem).size
+        return arm_assembly(self.problem).table.size
 
     @property
     def csv_reach(self) -> float:

@@ -40,7 +40,7 @@ from vdsm_pin.verification.records import (
     Pair,
     Verification,
 )
-from vdsm_pin.verification.task import ArmPairs
+from vdsm_pin.verification.task import ignored_pairs
 
 if TYPE_CHECKING:  # whoever verifies needs no planner
     from vdsm_pin.refinement import Refinement
@@ -174,7 +174,9 @@ def _own_facts(verification: Verification) -> dict[str, Any]:
         "path_length_m": None if path is None else path.length,
         "undrawn_m": tuple((float(a), float(b)) for a, b in verification.undrawn),
         "error_box": error_box(verification.errors, rows.n_links),
-        "left_out": left_out_rows(ArmPairs(problem).left_out),
+        "left_out": left_out_rows(
+            (*problem.manipulator.self_pairs.left_out, *ignored_pairs(problem))
+        ),
         "motion": motion_facts(problem, rows),
         "counterexamples": tuple(
             _arm_counterexample(verification, one)

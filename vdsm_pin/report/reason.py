@@ -22,7 +22,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance_check import LINKS, OBSTACLES
 from vdsm_pin.verification.inside import ARM_OUTSIDE, LINKS_OUTSIDE, surfaces
 from vdsm_pin.verification.records import ArmVerification, Check, Verdict, Verification
-from vdsm_pin.verification.task import ArmPairs
+from vdsm_pin.verification.task import ignored_pairs
 
 _PASSED: Final = Verdict.CERTIFIED
 
@@ -149,7 +149,7 @@ def _not_held(verification: Verification) -> str:
     problem = verification.problem
     if not isinstance(problem, PlanningProblem) or not problem.manipulator.ignore_pairs:
         return ""
-    if not (ignored := ArmPairs(problem).ignored):
+    if not (ignored := ignored_pairs(problem)):
         return ""
     names = listed([f"{one.body} and {one.other}" for one in ignored])
     return f" (the problem leaves out {names})"

@@ -1,81 +1,50 @@
 """What of a snake arm is held apart, and how the proof has it."""
 
-from functools import cached_property
-
 import numpy as np
 
 from vdsm_pin.arm.bodies import BY_FILE
 from vdsm_pin.arm.tree import arm_tree, link_frame
-from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.held import held_pairs
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.bodies import Body, LeftOut, PairTable
 from vdsm_pin.verification.assembly import Assembly
 
 
-class ArmPairs:
-    """Which pairs of a problem are judged, in the order of the certificate.
-
-    First come the pairs of a body and an obstacle, obstacle by obstacle, then those of
-    two bodies.
-
-    Args:
-        problem: Arm, scene, required clearances.
-    """
-
-    def __init__(self, problem: PlanningProblem) -> None:
-        self.problem, arm = problem, problem.manipulator
-        self.bodies, self.between = arm.convex_bodies, arm.self_pairs
-        names = problem.scene.names
-        held = held_pairs(arm, self.bodies, names).T
-        ignored = np.argwhere(~held).tolist()
-        # Numbers of the body and the obstacle of each pair, obstacle by obstacle.
-        self.outer: IntArray = np.argwhere(held)[:, ::-1]
-        self.ignored = tuple(
-            LeftOut(body, names[o], BY_FILE)
-            for o, body in dict.fromkeys((o, self.bodies[b].owner) for o, b in ignored)
-            if arm.ignores(body, names[o])
-        )
-
-    @property
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """Pairs that are not judged, each with the reason."""
-        return (*self.between.left_out, *self.ignored)
-
-    @cached_property
-    def number(self) -> IntArray:
-        """The pair of each body and obstacle, -1 for none, (n_bodies, n_obstacles)."""
-        shape = len(self.bodies), len(self.problem.scene.obstacles)
-        found = np.full(shape, -1)
-        found[tuple(self.outer.T)] = np.arange(len(self.outer))
-        return found
-
-    @property
-    def size(self) -> int:
-        """Number of pairs."""
-        return len(self.outer) + len(self.between.held)
+def ignored_pairs(problem: PlanningProblem) -> tuple[LeftOut, ...]:
+    """Bodies and obstacles that the problem file leaves out."""
+    arm = problem.manipulator
+    owners = dict.fromkeys(body.owner for body in arm.convex_bodies)
+    return tuple(
+        LeftOut(body, name, BY_FILE)
+        for name in (problem.scene.names if arm.ignore_pairs else ())
+        for body in owners
+        if arm.ignores(body, name)
+    )
 
 
 def arm_assembly(problem: PlanningProblem) -> Assembly:
-    """An arm among its obstacles, with the pairs in the order of the certificate."""
-    arm, which = problem.manipulator, ArmPairs(problem)
-    outer, between, n = which.outer, which.between.held, len(which.bodies)
+    """An arm among its obstacles, with the pairs in the order of the certificate.
+
+    First come the pairs of a body and an obstacle, obstacle by obstacle, then those of
+    two bodies.
+    """
+    arm, bodies = problem.manipulator, problem.manipulator.convex_bodies
+    obstacle, own = np.nonzero(held_pairs(arm, bodies, problem.scene.names).T)
+    between, n = arm.self_pairs.held, len(bodies)
     needed = problem.required_clearance, problem.required_self_clearance
-    named = [""] * arm.n_links + [body.name for body in which.bodies[arm.n_links :]]
-    own = [Body(link_frame(b.link), (b.piece,), b.name) for b in which.bodies]
     return Assembly(
         own_tree=arm_tree(arm),
-        own=own,
-        links=[body.link for body in which.bodies],
-        names=named,
-        balls=[body.ball for body in which.bodies],
+        own=[Body(link_frame(b.link), (b.piece,), b.name) for b in bodies],
+        links=[body.link for body in bodies],
+        names=[""] * arm.n_links + [body.name for body in bodies[arm.n_links :]],
+        balls=[body.ball for body in bodies],
         scene=problem.scene,
         table=PairTable(
-            one=np.concatenate([n + outer[:, 1], between[:, 0]]),
-            other=np.concatenate([outer[:, 0], between[:, 1]]),
-            required=np.repeat(np.array(needed), (len(outer), len(between))),
+            one=np.concatenate([n + obstacle, between[:, 0]]),
+            other=np.concatenate([own, between[:, 1]]),
+            required=np.repeat(np.array(needed), (len(own), len(between))),
         ),
         column_errors=lambda errors: np.append(0.0, errors.angles(arm.n_links)),
         packed=problem.packed,
-        chain=sum(not body.carried for body in which.bodies),
+        chain=sum(not body.carried for body in bodies),
     )

@@ -39,7 +39,6 @@ from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
-from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.tip import check_tip
 
 
@@ -166,12 +165,13 @@ def _survived(
     hulls, hulled = {proof.pairs[k].obstacle for k in doubtful}, problem
     if hulls:  # else with what the problem keeps packed
         hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
-    lower = np.append(proof.least.lower, np.inf)  # -1 is no pair
-    least = lower[ArmPairs(problem).number].min(axis=0)
+    asked, least = proof.motion.asked, np.full(len(problem.scene.names), math.inf)
+    obstacle = asked.table.one[asked.outer] - len(asked.own)
+    np.minimum.at(least, obstacle, proof.least.lower[asked.outer])
     least[[name in hulls for name in problem.scene.names]] = -math.inf
     errors, known = problem.errors, (deadline, least)
-    asked, name = (hulled, motion, errors, *known), "largest joint error"
-    largest = extras.take(name, nan, largest_joint_error, *asked)
+    args, name = (hulled, motion, errors, *known), "largest joint error"
+    largest = extras.take(name, nan, largest_joint_error, *args)
     if np.isnan(largest):
         return nan, nan
     name, more = "joint error that loses the clearance", (largest, *known)
