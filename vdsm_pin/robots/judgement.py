@@ -64,20 +64,22 @@ def verify_robot(
     proof, places = prove_motion(motion, budget), located(motion, deadline)
     asked = cell, path, proof.with_depths(deadline), places, extras, deadline
     found = judge_clearance(*asked, contacts=contacts)
-    coal, measured = _coal(cell, proof, [*found.nearest])
+    nearest = found.nearest
+    coal, measured = _coal(cell, proof, [*nearest])
     checks = [
         *checks_by_itself(cell.robot, path),
         *checks_of_others(cell.scene),
         *found.checks,
         *([coal] if proof.pairs else [_no_pair(cell)]),
     ]
-    nearest = found.nearest.items()
     return RobotVerification(
         problem=cell,
         trajectory=path,
         pairs=proof.pairs,
         checks=tuple(checks),
-        approaches=tuple(replace(one, coal=float(measured[k])) for k, one in nearest),
+        approaches=tuple(
+            replace(one, coal=float(measured[k])) for k, one in nearest.items()
+        ),
         profile=found.profile,
         least=found.least,
         counterexamples=found.counterexamples,
