@@ -44,6 +44,7 @@ from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.plane_bounds import place_disc, place_own
 from vdsm_pin.proof.results import Results, note_upper
 from vdsm_pin.proof.row_places import seen
+from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.search import Slicing, new_witness, place_pair, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
 from vdsm_pin.proof.swept_bodies import to_body
@@ -252,6 +253,15 @@ def _note_stretch(
 
 
 @compiled
+def _face(task: Task, mover: Mover, rows: Rows, plane: FloatArray, pair: int) -> None:
+    """Guess the plane of a pair that has none: from a corner to a partner's middle."""
+    pieces, obstacle = task.pieces, task.pairs.obstacle[pair]
+    p, place = pieces.first_piece[obstacle], rows.tracks.places[mover.slots[0]]
+    for c in range(3):
+        plane[c] = pieces.centre[p, c] - place[c, 0]
+
+
+@compiled
 def sweep_pair(
     task: Task,
     motion: Motion,
@@ -288,6 +298,8 @@ def sweep_pair(
     local, tried, fresh, proved = 0, count, False, -np.inf
     row = int(plane[ROW]) if plane[SUPPORT] > -np.inf else finer(task.pairs, pair, pair)
     mover = seen(task, rows, row)
+    if not plane[SUPPORT] > -np.inf:
+        _face(task, mover, rows, plane, pair)
     place_disc(mover, rows, runs, count)
     place_own(mover, rows, runs, plane, count)
     while clock() <= rules.until:

@@ -121,8 +121,9 @@ def _coal(
     sides = cell.sides(table.one[seen], table.other[seen], row)
     lower, upper = least.lower[seen], least.upper[seen]
     low, high = cell.coal.between_balls(poses[:, :, :3], sides)
-    close = (lower < table.required[seen] + NEAR) | np.isnan(low)
-    close |= np.isin(seen, told)
+    listed = np.zeros(table.size, np.bool_)
+    listed[told] = True
+    close = (lower < table.required[seen] + NEAR) | np.isnan(low) | listed[seen]
     near = Sides(*(side[close] for side in sides))
     found[seen[close]] = cell.coal.distances(poses[:, :, :3], near).distance
     off = disagreement(found[seen], lower, upper)
