@@ -29,7 +29,7 @@ NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apar
 WIDTH: Final = 0.2
 """Brackets wider than this part of the clearance are asked of a new plane; [-]."""
 
-NEAR: Final = 0.1
+NEAR: Final = 0.05
 """Coal measures pairs that may come nearer than this beyond what is required; [m]."""
 
 
