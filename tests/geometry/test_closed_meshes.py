@@ -17,6 +17,7 @@ from oracles.closed_solids import (
 )
 from scipy.sparse.csgraph import connected_components
 
+from vdsm_pin.geometry import closed_meshes
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.closed_meshes import close_mesh, closed_parts
 from vdsm_pin.geometry.mesh_edges import SLANT, clusters
@@ -106,6 +107,49 @@ def test_a_mesh_that_closes_by_triangles_in_line_has_others_of_two_corners() -> 
     parts = split, box(5.0)[1:], np.array([[a, a, b], [c, c, c]])
     assert where(*parts).side is Side.INSIDE
     assert where(*parts, point=np.array([9.0, 0.1, 0.2])).side is Side.OUTSIDE
+
+
+SCALES = [2.0**-10, 1.0, 2.0**10]
+"""What holds of a mesh holds of one larger or smaller by a power of two."""
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize(("share", "closed"), [(0.99, True), (1.01, False)])
+def test_a_triangle_counts_that_is_higher_than_1e_12_of_the_diagonal(
+    scale: float, share: float, closed: bool
+) -> None:
+    """One more along an edge of a cube, as high as stated, closes nothing."""
+    height = share * 1e-12 * np.sqrt(12.0)
+    more = np.array([[[1, 1, 1], [1, 1 - height, 0.5], [1, 1, -1]]])
+    corners = scale * np.concatenate([box(1.0), more])
+    search = closed_meshes._Search(corners.reshape(-1, 3), corners)
+    assert search.flat.tolist() == [False] * 12 + [closed]
+    assert search.most == pytest.approx(scale * 2e-4 * np.sqrt(12.0))
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize(("share", "thin"), [(0.8, True), (1.01, False)])
+def test_walls_thinner_than_1e_6_of_the_diagonal_are_seen_from_both_sides(
+    scale: float, share: float, thin: bool
+) -> None:
+    """A thin shell within a cavity, seen from the middle."""
+    wall = share * 1e-6 * 16.0 * np.sqrt(3.0)
+    shells = box(8.0), inwards(box(6.0)), box(6.0 - wall), inwards(box(6.0 - 2 * wall))
+    found = where(scale * np.concatenate(shells))
+    assert found.side is (Side.UNKNOWN if thin else Side.OUTSIDE)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize(("share", "joined"), [(0.99, True), (1.01, False)])
+def test_corners_are_joined_up_to_2e_4_of_the_diagonal(
+    scale: float, share: float, joined: bool
+) -> None:
+    """The lid of a cube that is lifted by as much as stated."""
+    corners = box(5.0)
+    gap = share * 2e-4 * np.linalg.norm([10.0, 10.0, 10.0])
+    corners[corners[:, :, 2].min(axis=1) > 0.0] += [0.0, 0.0, gap]
+    found = close_mesh(*Made(scale * corners, [], []).indexed())
+    assert found.closed == joined
 
 
 def test_seams_are_as_many_as_an_edge_lacks_partners_of_its_sense() -> None:

@@ -303,3 +303,17 @@ def test_bodies_whose_boxes_do_not_meet_seem_apart_and_others_as_deep_as_they_ar
         assert found == pytest.approx(expected, abs=1e-6)
         assert contacts.seeming_depth(*both, np.array([np.nan, 0, 0])) == -np.inf
     assert contacts.common_ball(*both, np.array([np.inf, 0, 0]))[0] == 0.0
+
+
+@pytest.mark.parametrize("one", PIECES)
+def test_of_a_depth_what_is_lost_to_rounding_is_taken_off(one: str) -> None:
+    """Of the depth that was climbed to, to the last digit."""
+    both = placed(PIECES[one], 0.0, np.eye(3)), placed(BOX, 0.11, np.eye(3))
+    point = np.array([0.055, 0.01, 0.0])
+    (mine, theirs), *_ = contacts._meeting(*both, point)
+    depth, _ = contacts._deepest(mine, theirs, point, np.inf)
+    lost = TOLERANCES.bracket_gap + TOLERANCES.arithmetic
+    sizes = [INNER * share * depth - lost for share in contacts.SHARES]
+    radius, _ = common_ball(*both, point)
+    assert radius > 0.0
+    assert min(abs(radius - size) for size in sizes) < 1e-15
