@@ -1,5 +1,6 @@
 """Rows of evidence and what is said of them: by hand."""
 
+from dataclasses import replace
 from math import inf, nan
 from types import SimpleNamespace
 from typing import Any
@@ -7,7 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.geometry.solids import Box
 from vdsm_pin.geometry.winding import Location, Side
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.inside import LINKS_OUTSIDE, Place, check_inside
 from vdsm_pin.verification.records import (
@@ -17,6 +24,7 @@ from vdsm_pin.verification.records import (
     _place,
     is_deepest,
 )
+from vdsm_pin.verification.verify import verify
 
 
 @pytest.mark.parametrize(
@@ -69,3 +77,47 @@ def test_the_row_of_meshes_counts_those_that_decide_it(
     assert row.where == "; ".join(sides[name].words(name) for name in bad)
     assert [row.moment] == pytest.approx([0.0 if bad else nan], nan_ok=True)
     assert check_inside(asked, {}) == ()
+
+
+def test_each_row_says_how_much_of_what_was_looked_at_against_which_limit() -> None:
+    """Of a straight arm of eight links in 41 rows, beside one box."""
+    ends = np.array([[3.126, 0.0, 0.0], [3.526, 0.0, 0.0]])
+    path = DesiredPath(ends[0], ends, required_coverage=1.0)
+    crate = Box("crate", np.array([1.5, 0.0, -1.0]), np.eye(3), np.full(3, 0.2))
+    needed: dict[str, Any] = {
+        "required_clearance": 0.01,
+        "required_self_clearance": 0.002,
+    }
+    needed |= {"max_row_change": 0.2, "tip_tolerance": 1e-5}
+    arm = built_in("hrm8")
+    problem = PlanningProblem("p", arm, Scene((crate,)), path, 0.0, np.eye(4))
+    problem = replace(problem, **needed)
+    x0 = np.linspace(0.0, 0.4, 41)
+    motion = Trajectory(np.ones(41, bool), x0, x0, *np.zeros((2, 41, 8)))
+    verification = verify(problem, motion)
+    assert verification.verdict is Verdict.CERTIFIED
+    found = [(row.name, row.count, row.limit, row.unit) for row in verification.checks]
+    box, cone = arm.max_joint_angle, arm.max_link_angle
+    coal = found.pop(13)
+    assert coal[0].startswith("distances by Coal")
+    assert coal[2:] == (TOLERANCES.coal_agreement, "m")
+    assert 8 + 21 <= coal[1] <= 41 * (8 + 21)
+    assert found == [
+        ("joint centres by Pinocchio against the closed form", 9 * 41, 1e-9, "m"),
+        ("alpha in its box", 8 * 41, box, "rad"),
+        ("theta in its box", 8 * 41, box, "rad"),
+        ("link angle psi in its cone", 8 * 41, cone, "rad"),
+        ("base on its rail", 41, arm.base_range[1], "m"),
+        ("change of a joint angle between waypoints", 8 * 41, 0.2, "rad"),
+        ("tip at its start", 1, 1e-5, "m"),
+        ("tip on the desired path at the waypoints", 41, 1e-5, "m"),
+        ("tip near the desired path between the waypoints", 40, path.spacing, "m"),
+        ("tip draws the path in the order given", 41, 1e-5, "m"),
+        ("coverage of the desired path", 1, 1.0, "share"),
+        ("clearance from obstacles", 8 * 40, 0.01, "m"),
+        ("clearance between links", 21 * 40, 0.002, "m"),
+        ("angles recovered from the cable lengths", 2 * 8 * 41, 1e-9, "rad"),
+    ]
+    moments = {row.name: row.moment for row in verification.checks}
+    assert moments["base on its rail"] == 40.0
+    assert moments["clearance from obstacles"] >= 0.0
