@@ -226,11 +226,9 @@ def coverage_map(asked: Asked, tests: list[str], jobs: int, kept: Path) -> Cover
     for place in places.values():
         one = json.loads(place.read_text())
         whole.seconds.update(one["seconds"])
-        for module, by_line in one["tests"].items():
-            for line, names in by_line.items():
-                whole.tests.setdefault(module, {}).setdefault(int(line), []).extend(
-                    names
-                )
+        for module in whole.tests.keys() & one["tests"].keys():  # others are gone
+            for line, names in one["tests"][module].items():
+                whole.tests[module].setdefault(int(line), []).extend(names)
     return whole
 
 

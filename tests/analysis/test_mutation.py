@@ -1,6 +1,7 @@
 """Changes are what they say, and a test that looks notices them."""
 
 import ast
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -190,6 +191,14 @@ def test_the_map_knows_which_test_runs_a_line(tmp_path: Path) -> None:
     assert list(seen.asked({"module.py": (2,)})) == ["test_one.py::test_one"]
     # No test runs line 3: what a module does at import, any test may see.
     assert list(seen.asked({"module.py": (3,)})) == ["test_one.py::test_one"]
+    # What is kept of a module that is gone, and that no test ran, is left out.
+    (place,) = kept.iterdir()
+    before = json.loads(place.read_text())
+    before["tests"]["gone.py"] = {"1": [], "2": []}
+    place.write_text(json.dumps(before))
+    again = coverage_map(asked, ["test_one.py"], 1, kept)
+    assert again == seen
+    assert json.loads(place.read_text()) == before  # the tests did not run again
 
 
 def test_each_file_of_tests_is_asked_before_any_twice() -> None:
