@@ -8,7 +8,9 @@ same way. Coal proposes, the bracket proves: a motion with a failed check is nev
 handed out as a plan.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import ceil, floor
 from typing import Final
 
 import numpy as np
@@ -210,7 +212,7 @@ def _chosen(problem: PlanningProblem, plan: Plan, deadline: Deadline) -> Plan:
     motions = [one.trajectory for one in plans]
     best, error = sturdiest(planned, motions, deadline)
     note = (
-        f"every joint may be off by {np.rad2deg(error):.3f} deg at once (proved); of "
+        f"every joint may be off by {_thousandths(error, floor)} at once (proved); of "
         f"{len(plans)} plans that draw as much none was proved to survive more"
     )
     start = plan.trajectory.part(0, 1)
@@ -218,7 +220,7 @@ def _chosen(problem: PlanningProblem, plan: Plan, deadline: Deadline) -> Plan:
     lost = refuted_joint_error(problem, start, none, survived, deadline)
     if np.isfinite(lost):
         note += (
-            f"; the start itself does not survive {np.rad2deg(lost):.3f} deg (proved)"
+            f"; the start itself does not survive {_thousandths(lost, ceil)} (proved)"
         )
     chosen = plans[best]
     return replace(chosen, problem=problem, notes=(*chosen.notes, note), rivals=())
@@ -254,12 +256,26 @@ def _worst(verification: ArmVerification) -> str:
     if not failed:
         return "every check passed"
     check = failed[0]
-    worst, limit = (
-        in_mm(value) if check.unit == "m" else f"{value:.6g} {check.unit}"
-        for value in (check.worst, check.limit)
-    )
+    worst, limit = (_shown(value, check.unit) for value in (check.worst, check.limit))
     where = f" ({check.where})" if check.where else ""
     return f"{check.name}: {check.verdict} with {worst} against {limit}{where}"
+
+
+def _thousandths(error: float, whole: Callable[[float], int]) -> str:
+    """A joint error, rounded so that no more is said than was proved; [rad]."""
+    return f"±{whole(1e3 * np.rad2deg(error)) / 1e3:.3f}°"
+
+
+def _shown(value: float, unit: str) -> str:
+    """The worst value of a check, or its limit, as people read it."""
+    match unit:
+        case "m":
+            return in_mm(value)
+        case "rad":
+            return f"{np.rad2deg(value):.3f}°"
+        case "share":
+            return f"{np.floor(round(1e3 * value, 6)) / 10.0:.1f} %"
+    return f"{value:.6g}" if unit == "-" else f"{value:.6g} {unit}"
 
 
 def _largest(margins: FloatArray) -> float:

@@ -1,7 +1,7 @@
 """Conversion between SI and what people type; for readers and writers only."""
 
 from collections.abc import Mapping
-from math import floor, isfinite
+from math import ceil, floor, isfinite
 from typing import Final
 
 UNITS_PER_METRE: Final[Mapping[str, float]] = {"m": 1.0, "mm": 1e3}
@@ -26,6 +26,12 @@ def proved_mm(length: float) -> str:
     """A length that is proved to be kept, rounded down; [m]."""
     scaled = round(length * MM_PER_M**2, 6)  # rounding noise is nothing
     return in_mm(floor(scaled) / MM_PER_M**2 if isfinite(scaled) else length)
+
+
+def at_most_mm(length: float) -> str:
+    """A length that is proved not to be exceeded, rounded up; [m]."""
+    scaled = round(length * MM_PER_M**2, 6)
+    return in_mm(ceil(scaled) / MM_PER_M**2 if isfinite(scaled) else length)
 
 
 def clearance_words(clearance: float, deeper: bool = False) -> str:

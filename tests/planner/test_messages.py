@@ -9,7 +9,7 @@ import pytest
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.units import in_mm
+from vdsm_pin.units import at_most_mm, in_mm, proved_mm
 
 PROBLEM = """
 vdsm_problem: 1
@@ -70,3 +70,14 @@ def test_a_place_is_told_where_the_file_has_it(tmp_path: Path) -> None:
     assert problem.in_file(np.zeros(3)) == "(1000.0, 2000.0, 300.0) mm"
     assert in_mm(0.0125) == "12.500 mm"
     assert in_mm(-1e-9) == in_mm(-0.0) == "0.000 mm"
+
+
+@pytest.mark.parametrize(
+    ("length", "kept", "found"),
+    [(0.0043669, "4.366", "4.367"), (-0.0003172, "−0.318", "−0.317"),
+     (0.0035, "3.500", "3.500")],
+)  # fmt: skip
+def test_no_more_is_said_of_a_bound_than_was_proved(
+    length: float, kept: str, found: str
+) -> None:
+    assert (proved_mm(length), at_most_mm(length)) == (f"{kept} mm", f"{found} mm")

@@ -105,7 +105,8 @@ def plan_reason(plan: Plan, verification: ArmVerification) -> str:
 def _incomplete_sentence(verification: ArmVerification, why: str) -> str:
     drawn = percent(verification.coverage)
     required = percent(verification.problem.path.required_coverage)
-    return f"incomplete: {drawn} drawn, because {why}; {required} is required"
+    drew = f"The motion draws {drawn} of the desired path, {required} is required"
+    return f"{drew}: {why}."
 
 
 def _left_out(verification: ArmVerification) -> str:
@@ -115,7 +116,7 @@ def _left_out(verification: ArmVerification) -> str:
         return "no waypoint draws the desired path"
     first = " to ".join(quantity(float(station), "m") for station in gaps[0])
     stretches = "1 stretch, from" if len(gaps) == 1 else f"{len(gaps)} stretches, from"
-    return f"the motion leaves out {stretches} {first} along the path"
+    return f"it leaves out {stretches} {first} along the path"
 
 
 def _certified_sentence(verification: Verification) -> str:

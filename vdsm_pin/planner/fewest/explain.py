@@ -47,7 +47,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import say
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import in_mm
+from vdsm_pin.units import at_most_mm, in_mm
 
 
 def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
@@ -125,7 +125,7 @@ def _proved(problem: PlanningProblem, outcome: Outcome) -> Infeasible:
         station=float(rows.stations[first]),
         reason=(
             f"at {in_mm(rows.stations[first])} along the path the tip itself would "
-            f"have at most {in_mm(least)} to it, required are "
+            f"have at most {at_most_mm(least)} to it, required are "
             f"{in_mm(problem.required_clearance)}"
         ),
     )

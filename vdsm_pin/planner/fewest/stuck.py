@@ -25,7 +25,7 @@ from vdsm_pin.planner.upper_clearance import (
 )
 from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.units import in_mm
+from vdsm_pin.units import at_most_mm, in_mm
 
 AT_LIMIT: Final = 0.97
 """Part of the largest link angle from which on a joint counts as at its limit; [-]."""
@@ -216,7 +216,7 @@ def on_the_path(
     name = problem.scene.obstacles[int(np.argmin(clearances[near]))].name
     told = (
         f"at {problem.in_file(places[near])} the path leaves the tip itself "
-        f"{in_mm(least[near])} to {name!r}, required are "
+        f"{at_most_mm(least[near])} to {name!r}, required are "
         f"{in_mm(problem.required_clearance)}, and the search keeps {in_mm(kept)}; try "
         f"a smaller `required_clearance`, a path farther from {name!r}, or "
         "`blocked: detour` to draw the rest"
