@@ -24,6 +24,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.reason import reason
 from vdsm_pin.verification.approaches import _station
+from vdsm_pin.verification.coal_check import COAL
 from vdsm_pin.verification.records import (
     ClosestApproach,
     Pair,
@@ -575,3 +576,18 @@ def test_a_body_may_be_named_like_a_part_of_none(tmp_path: Path) -> None:
     _, found = judged(file, motion_in(tmp_path, np.zeros((2, 7))))
     assert ("lens part 1", "post") in {(p.own, p.obstacle) for p in found.pairs}
     assert not [c for c in found.checks if c.where.startswith("not done")]
+
+
+def test_coal_measures_each_part_of_a_carried_mesh(tmp_path: Path) -> None:
+    """Two hulls, nearer than the triangles; oracle: Coal's own distance of each."""
+    write_cube(tmp_path / "cube.stl", 0.09)
+    mesh = {"name": "scanner", "link": 3, "shape": "mesh", "file": "cube.stl"}
+    mesh |= {"parts": 2, "check_size": False}
+    problem = problem_in(tmp_path, {"bodies": [mesh]}, [BALL | {"center": [1, 0.3, 0]}])
+    _, found = judged(problem, motion_in(tmp_path, sliding()))
+    parts = [one for one in found.approaches if one.pair.obstacle and one.pair.body]
+    assert {one.pair.body for one in parts} == {"scanner part 1", "scanner part 2"}
+    for one in parts:
+        assert one.lower - 1e-5 <= one.coal <= one.upper + 1e-5
+    row = next(row for row in found.checks if row.name == COAL)
+    assert row.verdict is Verdict.CERTIFIED
