@@ -1,5 +1,6 @@
 """Refinement: what is missing is added, and nothing uncertified is handed out."""
 
+import math
 import sys
 from dataclasses import replace
 from typing import Any
@@ -123,7 +124,8 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
     assert errors[1] > errors[0] > 0.0
     kept = largest_joint_error(task, result.plan.trajectory, ErrorBox())
     assert kept == errors[1]
-    assert f"{np.rad2deg(kept):.3f} deg at once" in result.plan.notes[-1]
+    told = math.floor(1e3 * np.rad2deg(kept)) / 1e3
+    assert f"off by ±{told:.3f}° at once" in result.plan.notes[-1]
     assert "of 3 plans" in result.plan.notes[-1]
     assert not result.plan.rivals
     assert result.verification.verdict is Verdict.CERTIFIED
