@@ -152,6 +152,18 @@ def test_corners_are_joined_up_to_2e_4_of_the_diagonal(
     assert found.closed == joined
 
 
+def test_corners_of_closed_parts_are_joined_with_none() -> None:
+    """Not even where a face of theirs is turned round and they are as small as gaps."""
+    corners = box(5.0)
+    size = np.linalg.norm([10.0, 10.0, 10.0])
+    corners[corners[:, :, 2].min(axis=1) > 0.0] += [0.0, 0.0, 5e-6 * size]
+    tips = 6e-6 * size * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    speck = tips[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3][::-1]]] + [0.0, 0.0, 9.0]
+    found = close_mesh(*Made(np.concatenate([corners, speck]), [], []).indexed())
+    assert found.single[:16].all()
+    assert found.gap == pytest.approx(5e-6 * size, rel=1e-3)
+
+
 def test_seams_are_as_many_as_an_edge_lacks_partners_of_its_sense() -> None:
     """Two cubes that meet at an edge, which both have forwards alone: it lacks two."""
     ends, parts = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]), []
