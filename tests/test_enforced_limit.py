@@ -1,6 +1,8 @@
 """What does not ask the clock is interrupted a little after the time limit."""
 
+import importlib
 import signal
+import sys
 import threading
 import time
 from pathlib import Path
@@ -31,6 +33,23 @@ def test_a_loop_that_never_asks_is_interrupted_and_nothing_is_left_behind() -> N
             for_ever()
     assert signal.getsignal(signal.SIGALRM) is before
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_a_library_is_imported_whole_before_the_end_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that is imported by halves may not be imported again."""
+    slow = "import time\nend = time.monotonic() + 0.3\n"
+    slow += "while time.monotonic() < end:\n    pass\nwhole = True\n"
+    (tmp_path / "slow_to_import.py").write_text(slow)
+    monkeypatch.syspath_prepend(tmp_path)
+    begun = time.monotonic()
+    soon = Deadline(2.0, begun - GRACE + 0.1)
+    with pytest.raises(OutOfTime), enforced(soon):
+        importlib.import_module("slow_to_import")
+        for_ever()
+    assert sys.modules.pop("slow_to_import").whole
+    assert 0.3 <= time.monotonic() - begun < 5.0
 
 
 def test_who_takes_it_for_a_failure_is_interrupted_again() -> None:

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import inf, isnan
 from numbers import Real
+from types import FrameType
 from typing import Final
 
 from vdsm_pin.errors import InvalidInput, OutOfTime
@@ -81,11 +82,25 @@ AGAIN: Final = 1.0
 """What took an interruption for a failure of its own is interrupted again; [s]."""
 
 
+SOON: Final = 0.02
+"""While a library is imported the end is told again so much later; [s]."""
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether what runs is a part of an import."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
+
+
 @contextmanager
 def enforced(deadline: Deadline, grace: float = GRACE) -> Iterator[None]:
     """Interrupt whatever still runs a little after a deadline.
 
-    Python code is interrupted between two of its steps; one call of a library is not.
+    Python code is interrupted between two of its steps; one call of a library is not,
+    nor is an import: a library that is half imported is of no use to who comes next.
     Only the main thread of a process can be, and only where there are such signals:
     elsewhere nothing is enforced.
 
@@ -103,8 +118,11 @@ def enforced(deadline: Deadline, grace: float = GRACE) -> Iterator[None]:
 
     rung = False
 
-    def ring(*_: object) -> None:
+    def ring(_: int, frame: FrameType | None) -> None:
         nonlocal rung
+        if _imports(frame):
+            signal.setitimer(signal.ITIMER_REAL, SOON, AGAIN)
+            return
         rung = True
         raise OutOfTime(deadline.limit)
 
