@@ -15,7 +15,7 @@ plan = vp.plan(problem, time_limit=300.0)
 motion = plan.trajectory
 bent = (np.hypot(motion.alpha, motion.theta) > np.radians(0.05)).sum(axis=1)
 print(plan)
-print("bent joints on the seam: at most", bent[motion.on_path].max())
+print("changed link angles on the seam: at most", bent[motion.on_path].max())
 
 # The vessel may stand 1 mm off in any direction.
 result = vp.verify(problem, motion, errors=vp.ErrorBox(obstacle_mm=1.0))

@@ -7,7 +7,7 @@ import numpy as np
 import vdsm_pin as vp
 
 problem = vp.read_problem("paper/obs3")
-print("strategy    time [s]  bent joints, mean  clearance [mm]  joint error [deg]")
+print("strategy    time [s]  changed angles, mean  clearance [mm]  joint error [deg]")
 for strategy in ("fewest", "clearest", "sturdiest", "paper"):
     begin = time.process_time()
     motion = vp.plan(problem, strategy=strategy).trajectory
@@ -16,6 +16,6 @@ for strategy in ("fewest", "clearest", "sturdiest", "paper"):
     bent = np.hypot(motion.alpha, motion.theta) > np.radians(0.05)
     mean = bent[motion.on_path].sum(axis=1).mean()
     clear, error = 1000.0 * result.min_clearance, np.degrees(result.joint_error)
-    print(f"{strategy:10} {spent:9.2f} {mean:18.2f} {clear:15.2f} {error:18.3f}")
+    print(f"{strategy:10} {spent:9.2f} {mean:21.2f} {clear:15.2f} {error:18.3f}")
     assert result.verdict is vp.Verdict.CERTIFIED
     vp.write_report(result, f"strategies_{strategy}.html")

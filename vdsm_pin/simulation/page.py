@@ -145,6 +145,12 @@ def _angles(found: Simulation, letter: str) -> list[dict[str, Any]]:
     ]
 
 
+def _told(value: object) -> str:
+    """A setting as people write it: 350000, not 350000.0."""
+    short = f"{value:.6g}" if isinstance(value, float) and value < 1e4 else f"{value}"
+    return short.removesuffix(".0")
+
+
 def assumptions(settings: Settings) -> tuple[tuple[str, str, str], ...]:
     """Name, value and reason of everything that was assumed."""
     rows = []
@@ -154,7 +160,7 @@ def assumptions(settings: Settings) -> tuple[tuple[str, str, str], ...]:
             rows.append((name, str(part or 0), field.description or ""))
             continue
         rows += [
-            (f"{name}.{key}", str(getattr(part, key)), inner.description or "")
+            (f"{name}.{key}", _told(getattr(part, key)), inner.description or "")
             for key, inner in type(part).model_fields.items()
         ]
     return tuple(rows)
