@@ -509,6 +509,30 @@ def test_damaged_trajectories_never_end_in_a_traceback(
     assert refused > 100
 
 
+@pytest.mark.parametrize("ending", [".bag", ".mcap"])
+def test_damaged_bags_end_in_one_sentence(
+    tmp_path: Path, robot: Robot, ending: str
+) -> None:
+    """Bytes changed or cut off; sizes that are damaged may ask for any memory."""
+    rng, refused = np.random.default_rng(8), 0
+    whole = written(tmp_path, ending, motion(2), robot).read_bytes()
+    for k in range(60):
+        content = bytearray(whole)
+        for at in rng.integers(len(content), size=int(rng.integers(1, 4))):
+            content[at] = int(rng.integers(256))
+        end = int(rng.integers(len(whole))) if k % 3 == 0 else len(whole)
+        (tmp_path / f"t{ending}").write_bytes(content[:end])
+        try:
+            found = read_bag(tmp_path / f"t{ending}")
+        except VdsmError as error:
+            refused += 1
+            assert len(str(error).splitlines()) == 1
+            assert str(error).isprintable()
+        else:
+            assert np.isfinite(found.q).all()
+    assert 20 < refused < 60
+
+
 def run(*arguments: object) -> int:
     with pytest.raises(SystemExit) as ended:
         main([str(argument) for argument in arguments])
