@@ -66,6 +66,15 @@ def test_rows_that_do_not_move_take_no_time() -> None:
     assert row_times(HRM8, rest, Speed())[-1] == 0.0
 
 
+def test_without_mujoco_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise ImportError
+
+    monkeypatch.setattr("vdsm_pin.simulation.closed_loop.load_mujoco", missing)
+    with pytest.raises(InvalidInput, match=r"pip install 'vdsm-pin\[simulation\]'"):
+        run()
+
+
 def test_the_arm_follows_within_a_tenth_of_a_degree_or_so(calm: Simulation) -> None:
     assert np.rad2deg(calm.largest_error) < 0.5
     settled = calm.errors[-10:]

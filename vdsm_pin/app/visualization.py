@@ -78,7 +78,7 @@ class ViewServer(ThreadingHTTPServer):
             super().__init__((HOST, port), _Handler)
         except OSError as error:
             reason = error.strerror or error
-            message = f"port {port} cannot be used: {reason}; 0 takes a free one"
+            message = f"port {port} cannot be used: {reason}; --port 0 is free"
             raise InvalidInput(message) from error
 
     @property

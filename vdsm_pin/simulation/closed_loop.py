@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.errors import InvalidInput, VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.robots.mjcf import load_mujoco
@@ -94,8 +94,9 @@ def simulate(
         Planned and executed motion at the recorded times.
 
     Raises:
-        InvalidInput: If settings contradict each other or the arm.
-        VerificationFailed: If MuJoCo is not installed, or the simulation diverges.
+        InvalidInput: If settings contradict each other or the arm, or MuJoCo is not
+            installed.
+        VerificationFailed: If the simulation diverges.
     """
     settings.check(manipulator.n_links)
     return _Loop(manipulator, trajectory, settings).run()
@@ -106,7 +107,7 @@ def _mujoco() -> Any:
         return load_mujoco()
     except ImportError as error:
         message = "mujoco is not installed: pip install 'vdsm-pin[simulation]'"
-        raise VerificationFailed(message) from error
+        raise InvalidInput(message) from error
 
 
 class _Loop:
