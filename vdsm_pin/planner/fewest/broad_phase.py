@@ -19,7 +19,7 @@ from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import HELD, PackedPieces, disc_extent, pack_pieces
 from vdsm_pin.geometry.solids import Mesh
-from vdsm_pin.planner.fewest.mesh_distance import STEP, Surfaces, surfaces_of
+from vdsm_pin.planner.fewest.mesh_distance import Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.problem.held import Axes, HeldApart, HeldGroup
@@ -31,6 +31,8 @@ from vdsm_pin.tolerances import TOLERANCES
 FAR = 0.0256
 """A bound of the clearance above this is as good as the clearance itself, over the
 arm's length; [-]."""
+STEP = 3.19e-7
+"""What is taken off distances from meshes for rounding, over the arm's length; [-]."""
 STRETCHES = 6
 """Stretches into which a link is cut for its boxes."""
 SLICES = 8
@@ -60,8 +62,10 @@ class Cover:
     group: HeldGroup
 
     @classmethod
-    def of(cls, obstacles: tuple[Obstacle, ...], group: HeldGroup) -> "Cover":
-        """Of a group's obstacles."""
+    def of(
+        cls, obstacles: tuple[Obstacle, ...], group: HeldGroup, step: float
+    ) -> "Cover":
+        """Of a group's obstacles, with steps of so much; [m]."""
         solid = tuple(one for one in obstacles if not isinstance(one, Mesh))
         covers = [_cover(obstacle) for obstacle in solid]
         flat = [
@@ -71,7 +75,7 @@ class Cover:
             if isinstance(piece, HalfSpacePiece)
         ]
         boxes = np.concatenate([np.zeros((0, 2, 3)), *covers])
-        planes, surfaces = np.array(flat).reshape(-1, 4), surfaces_of(obstacles)
+        planes, surfaces = np.array(flat).reshape(-1, 4), surfaces_of(obstacles, step)
         others = pack_pieces([one.pieces for one in solid])
         return cls(boxes, planes, surfaces, others, covers_of(solid, others), group)
 
@@ -102,7 +106,8 @@ class Cover:
             number: Which axis each is of, shape (n,); None where all are alike.
         """
         which, some, radii = self.group.held(ends, number)
-        gaps = link_clearances(self.others, self.insides, some, 0.0, STEP, STEP)
+        step = self.surfaces.step
+        gaps = link_clearances(self.others, self.insides, some, 0.0, step, step)
         return which, gaps[:, 0] - radii
 
 
@@ -119,6 +124,7 @@ class BroadPhase:
         floor: Clearance below which -inf will do; where that is -inf, all bounds from
             meshes are exact; [m].
         far: A bound from boxes above this is left as it is; [m].
+        step: Of `surfaces`; [m].
         deadline: When planning must have ended.
     """
 
@@ -127,6 +133,7 @@ class BroadPhase:
     held: HeldApart
     floor: float
     far: float
+    step: float
     deadline: Deadline = NO_LIMIT
 
     def __call__(self, centres: FloatArray, axes: Axes = None, /) -> FloatArray:
@@ -145,13 +152,13 @@ class BroadPhase:
             np.minimum.at(mesh, which, surfaces)
         # A step below the distance will do, but not where it decides.
         near = clearances < self.far
-        near |= mesh < min(self.far, self.floor + STEP)
+        near |= mesh < min(self.far, self.floor + self.step)
         np.minimum(clearances, mesh, out=clearances)
-        blocked = near & (mesh < self.floor - STEP)
+        blocked = near & (mesh < self.floor - self.step)
         clearances[blocked] = -np.inf
         near &= ~blocked
         # Where no step of a mesh decides, what is beside meshes is measured alone.
-        alone = near & (mesh >= self.floor + STEP) & (mesh < np.inf)
+        alone = near & (mesh >= self.floor + self.step) & (mesh < np.inf)
         asked = np.flatnonzero(near & ~alone)
         if asked.size:
             of = None if number is None else number[asked, None]
@@ -172,9 +179,9 @@ class BroadPhase:
 
 def broad_phase(problem: PlanningProblem, clearance: LinkClearance) -> BroadPhase:
     """The clearance function of a problem with its boxes."""
-    obstacles = problem.scene.obstacles
+    obstacles, length = problem.scene.obstacles, problem.manipulator.total_length
     covers = tuple(
-        Cover.of(tuple(obstacles[o] for o in group.obstacles), group)
+        Cover.of(tuple(obstacles[o] for o in group.obstacles), group, STEP * length)
         for group in problem.held.groups
     )
     return BroadPhase(
@@ -182,7 +189,8 @@ def broad_phase(problem: PlanningProblem, clearance: LinkClearance) -> BroadPhas
         covers,
         problem.held,
         problem.required_clearance - TOLERANCES.planned_clearance,
-        FAR * problem.manipulator.total_length,
+        FAR * length,
+        STEP * length,
         deadline=deadline_of(clearance),
     )
 

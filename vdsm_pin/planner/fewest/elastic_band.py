@@ -1,33 +1,52 @@
 """Ways of the tip shortened, pulled to the middle of openings, and refined there.
 
-An elastic band (Quinlan 1994): what it is worth counts the room at its points, and that
-of the chords which an arm lays on it. Nothing is proved here.
+An elastic band (Quinlan 1994): what it is worth counts the room between its points and
+on the chords that an arm lays on it, and by how much more than the arm it bends. Moves
+are tried by chance. Nothing is proved here.
 """
 
-from typing import Final
+import itertools
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.tip_room import LEAST, NARROW, TipRoom
 from vdsm_pin.planner.spacing import spread
 from vdsm_pin.problem.pointing import angles_between
 
-PULLS: Final = 30
-"""Rounds of pulling a way to the middle of its openings."""
+QUICK: Final = (1, 3)
+"""Times that a way is pulled from its beginning until an arm can follow it, and times
+that stretches of all widths are moved."""
+THOROUGH: Final = (3, 16)
+"""The same for ways that an arm has not followed."""
+LITTLE: Final = 0.25
+"""What a way must become worth more for another time; [-]."""
+ENOUGH: Final = 4.0
+"""The same where an arm can follow it; [-]."""
+LEAST_GAIN: Final = 1e-4
+"""What a move must be worth; [-]."""
 SHIFTS: Final = 8
-"""Places tried for each point in a round by chance."""
+"""Moves tried for each stretch in a round by chance."""
 SIZES: Final = (0.5, 0.2, 0.1)
-"""How far away they are, round after round, over the body's radius; [-]."""
+"""How far they go, round after round, over the body's radius or over what bends the arm
+by `SWAY`; [-]."""
 FINER: Final = (0.05, 0.02, 0.01)
 """The same where it is narrow; [-]."""
-CHORDS: Final = 2.0
-"""What a way is worth more for chords with all the room that is worth having; [-]."""
-STEEP: Final = 0.85
+SWAY: Final = 0.4
+"""Part of the largest link angle by which a move bends a way at most; [-]."""
+ROOM: Final = 2.0
+"""What a way is worth for all the room worth having at a point, and for that of the
+chords there; [-]."""
+DEEPEST: Final = -10.0
+"""The least room, over what is worth having, that is told from less; [-]."""
+STEEP: Final = 0.8
 """Part of the largest link angle that a way may bend by from chord to chord; [-]."""
-STEEP_COST: Final = 4.0
-"""What a way is worse for each part of that angle that it bends more; [-]."""
+STEEP_COST: Final = 10.0
+"""What a way is worse for the square of the part of that angle it bends more; [-]."""
+STEEPEST: Final = 0.95
+"""The part that an arm surely follows; [-]."""
 BOW: Final = 0.2
 """Part of the room of a narrow place that the way between two points may bow; [-]."""
 
@@ -51,7 +70,12 @@ def shortened(room: TipRoom, route: FloatArray) -> FloatArray:
     return route[kept]
 
 
-def refined(room: TipRoom, route: FloatArray) -> FloatArray:
+def refined(
+    room: TipRoom,
+    route: FloatArray,
+    behind: FloatArray,
+    effort: tuple[int, int] = QUICK,
+) -> FloatArray:
     """A way with points so close, where it is narrow, that an arm can follow it.
 
     A way that bends as much as the arm can bows between two points at a distance h
@@ -60,107 +84,200 @@ def refined(room: TipRoom, route: FloatArray) -> FloatArray:
     Args:
         room: What the tip has to spare.
         route: Shape (k, 3); [m].
+        behind: As `pulled` has it.
+        effort: As `pulled` has it.
     """
     spare = np.maximum(room.spare(route), LEAST * room.arm.most_radius)
     radius = room.arm.link_lengths.max() / (2.0 * np.sin(room.arm.max_link_angle / 2.0))
     step = np.sqrt(8.0 * radius * BOW * np.minimum(spare[:-1], spare[1:]))
     sides = np.linalg.norm(np.diff(route, axis=0), axis=1)
     counts = np.maximum(1, np.ceil(sides / step).astype(np.int64))
-    if (counts == 1).all():
-        return route
     at, share = spread(counts)
     part = share[:, None]
-    return pulled(room, (1.0 - part) * route[at] + part * route[at + 1], FINER)
+    route = (1.0 - part) * route[at] + part * route[at + 1]
+    return pulled(room, route, behind, FINER, effort)
 
 
 def pulled(
-    room: TipRoom, route: FloatArray, sizes: tuple[float, ...] = SIZES
+    room: TipRoom,
+    route: FloatArray,
+    behind: FloatArray,
+    sizes: tuple[float, ...] = SIZES,
+    effort: tuple[int, int] = QUICK,
 ) -> FloatArray:
     """A way straightened, and in the middle where it is narrow (elastic band).
+
+    Long stretches are moved first, then shorter and shorter ones. What is clear between
+    two of its points stays so.
 
     Args:
         room: What the tip has to spare.
         route: Shape (k, 3), its ends stay; [m].
-        sizes: How far away places are tried, over the body's radius; [-].
+        behind: What the arm lies on behind the way, from its end on, shape (b, 3); [m].
+        sizes: How far stretches are moved, see `SIZES`; [-].
+        effort: `QUICK` or `THOROUGH`.
     """
-    rng, route, room = np.random.default_rng(len(route)), route.copy(), room.near
-    for round_ in range(PULLS):
-        size = room.arm.most_radius * sizes[round_ % len(sizes)]
-        for parity in (1, 2):
-            inner = np.arange(parity, len(route) - 1, 2)
-            if len(inner):
-                shifts = rng.normal(size=(len(inner), SHIFTS, 3)) * size
-                route[inner] = _better(room, route, inner, shifts)
-    return route
+    if len(route) < 3:
+        return route
+    rng, band = np.random.default_rng(len(route)), _Band(room, behind)
+    widest = len(route) // 2 if sizes is SIZES else 2
+    widths = [widest >> k for k in range(widest.bit_length() + 1)]
+    own = best = _Way(route, *band.worth(route[None]))
+    tries, passes = effort
+    for _ in range(0 if sizes is FINER and own.sound else tries):
+        way, before = own, -np.inf
+        for _ in range(passes):
+            for width, size in itertools.product(widths, sizes):
+                way = band.moved(way, width, size, rng)
+            if way.total < before + (ENOUGH if way.sound else LITTLE):
+                break
+            before = way.total
+        best = way if way.total > best.total else best
+        if best.sound:
+            break
+    return best.points
 
 
-def _better(
-    room: TipRoom, route: FloatArray, inner: IntArray, shifts: FloatArray
-) -> FloatArray:
-    """The best of some places for every other point of a way, shape (n, 3).
+def is_followed(room: TipRoom, route: FloatArray, behind: FloatArray) -> bool:
+    """Whether an arm can follow a way, see `pulled`."""
+    return _Way(route, *_Band(room, behind).worth(route[None])).sound
 
-    An arm that follows a way lays its links as chords on it, which bow to the
-    inside of a bend: a place is the better the more room the chords have that end
-    there, and the less one turns against the other. Room is asked for only where it
-    can make a place better than those before.
+
+class _Way(NamedTuple):
+    """A way and what it is worth.
+
+    Args:
+        points: Shape (n, 3); [m].
+        worth: At each point, shape (1, n); [-].
+        blocked: Whether it is blocked between its points, shape (1, n - 1).
+        kept: Whether an arm can lie on it at each point, shape (1, n).
     """
-    middle = (route[inner - 1] + route[inner + 1])[:, None] / 2.0
-    own, radius = route[inner][:, None], room.arm.most_radius
-    tried = np.concatenate([own, (own + middle) / 2.0, middle, own + shifts], 1)
-    back, ahead = (ends[:, None] for ends in _chords(room.arm, route, inner))
-    turn = angles_between(tried - back, ahead - tried)
-    steep = np.maximum(0.0, turn / room.arm.max_link_angle - STEEP)
-    cost = np.linalg.norm(tried - middle, axis=2) / radius + STEEP_COST * steep
-    best, least = np.zeros(len(inner), np.int64), np.full(len(inner), -np.inf)
-    for columns in (slice(0, 1), slice(1, 3), slice(3, None)):
-        score = np.full(cost.shape, -np.inf)
-        some = cost[:, columns] < (2.0 + CHORDS - least)[:, None]
-        row, column = np.nonzero(some)
-        column += columns.start
-        score[row, column] = _room_worth(
-            room, tried[row, column], back[row, 0], ahead[row, 0],
-            least[row] + cost[row, column],
-        ) - cost[row, column]  # fmt: skip
-        first = score.argmax(axis=1)
-        highest = score[np.arange(len(inner)), first]
-        best = np.where(highest > least, first, best)
-        least = np.maximum(highest, least)
-    return np.asarray(tried[np.arange(len(inner)), best])
+
+    points: FloatArray
+    worth: FloatArray
+    blocked: BoolArray
+    kept: BoolArray
+
+    @property
+    def total(self) -> float:
+        """What it is worth; [-]."""
+        return float(self.worth.sum())
+
+    @property
+    def sound(self) -> bool:
+        """Whether an arm can follow it."""
+        return bool(self.kept.all() and not self.blocked.any())
 
 
-def _room_worth(
-    room: TipRoom,
-    places: FloatArray,
-    back: FloatArray,
-    ahead: FloatArray,
-    least: FloatArray,
-) -> FloatArray:
-    """What the room at places and on their chords is worth, 2 + CHORDS at most; [-].
+class _Band:
+    """Ways pulled at.
 
     Args:
         room: What the tip has to spare.
-        places: Shape (n, 3); [m].
-        back: Where the chord behind each begins; [m].
-        ahead: Where the chord ahead of each ends; [m].
-        least: A worth up to which -inf will do, shape (n,); [-].
+        behind: What the arm lies on behind them; [m].
     """
-    wide = room.spare(places) / (NARROW * room.arm.most_radius)
-    wide = np.minimum(wide, 1.0)
-    worth = np.where(wide > 0.0, 2.0 * wide, 10.0 * (wide - 1.0))
-    chords = np.ones(len(places))
-    for ends in (back, ahead):
-        asked = np.flatnonzero(worth + CHORDS * chords > least)
-        spare = room.spare(places[asked], ends[asked])
-        spare = np.clip(spare / (NARROW * room.arm.most_radius), -1.0, 1.0)
-        chords[asked] = np.minimum(chords[asked], spare)
-    worth = worth + CHORDS * chords
-    return np.where(worth > least, worth, -np.inf)
+
+    def __init__(self, room: TipRoom, behind: FloatArray) -> None:
+        self.room, self.arm = room.near, room.arm
+        link = float(self.arm.link_lengths.max())
+        self.behind = behind[::-1]
+        self.wanted, self.link = NARROW * self.arm.most_radius, link
+
+    def moved(
+        self, way: _Way, width: int, size: float, rng: np.random.Generator
+    ) -> _Way:
+        """A way with stretches moved to the best of some places.
+
+        Args:
+            way: The way.
+            width: Half the stretches' width, in points.
+            size: How far they go, see `SIZES`.
+            rng: Source of chance.
+        """
+        route, n = way.points, len(way.points)
+        sides = np.linalg.norm(np.diff(route, axis=0), axis=1)
+        # Beside a stretch nothing moves as far as chords reach.
+        reach = int(np.ceil(self.link / float(sides.mean())))
+        period = 2 * (width + reach) + 2
+        offset = np.arange(n) - 1 - int(rng.integers(period))
+        owner, place = offset // period + 1, offset % period - width - reach
+        bump = np.cos(np.pi * place / (2 * width + 2)) ** 2
+        bump[np.abs(place) > width] = 0.0
+        bump[[0, -1]] = 0.0
+        far = self._far(float(sides.mean()) * (width + 1.0))
+        shifts = rng.normal(size=(SHIFTS, owner[-1] + 1, 3)) * far
+        tried = route + (size * bump)[:, None] * shifts[:, owner]
+        before = route[np.maximum(np.arange(n) - width - 1, 0)]
+        ahead = route[np.minimum(np.arange(n) + width + 1, n - 1)]
+        towards = bump[:, None] * ((before + ahead) / 2.0 - route)
+        others = [route + 0.5 * towards, route + towards, route]
+        tried = np.concatenate([tried, others])
+        worth, blocked, _ = self.worth(tried)
+        better, shut = worth - worth[-1], blocked & ~way.blocked
+        better[:, 1:] = np.where(shut, -np.inf, better[:, 1:])
+        better[:, :-1] = np.where(shut, -np.inf, better[:, :-1])
+        begins = np.flatnonzero(np.append(True, owner[1:] != owner[:-1]))
+        gain = np.add.reduceat(better, begins, axis=1)
+        best, number = gain.argmax(axis=0), owner - owner[0]
+        good = (gain.max(axis=0) > LEAST_GAIN)[number]
+        for chosen in (good, good & (owner % 2 == 0), good & (owner % 2 == 1)):
+            new = np.where(chosen[:, None], tried[best[number], np.arange(n)], route)
+            now = _Way(new, *self.worth(new[None]))
+            if not (now.blocked & ~way.blocked).any() and now.total > way.total:
+                return now
+        return way
+
+    def _far(self, half: float) -> float:
+        """How far stretches so wide may go to bend a way by `SWAY` at most; [m]."""
+        bent = SWAY * self.arm.max_link_angle * half**2 / self.link
+        return max(self.arm.most_radius, min(bent, half))
+
+    def worth(self, routes: FloatArray) -> tuple[FloatArray, BoolArray, BoolArray]:
+        """What `_Way` has of ways, shape (c, n, 3).
+
+        An arm that follows a way lays its links as chords on it, which bow to the
+        inside of a bend: a place is the better the more room the chords have that end
+        there, and the less one turns against the other.
+        """
+        count, n = routes.shape[:2]
+        lines = self._spare(routes[:, :-1], routes[:, 1:])
+        wide = np.ones((count, n))
+        wide[:, 1:] = np.minimum(wide[:, 1:], lines)
+        wide[:, :-1] = np.minimum(wide[:, :-1], lines)
+        head = np.broadcast_to(self.behind, (count, *self.behind.shape))
+        every, k = np.concatenate([head, routes], axis=1), len(self.behind)
+        back, ahead = _chords(self.arm, every[-1], np.arange(k, k + n))
+        own, first, last = routes, every[:, back], every[:, ahead]
+        chords = np.minimum(self._spare(first, own), self._spare(own, last))
+        turn = angles_between(own - first, last - own) / self.arm.max_link_angle
+        # At the end nothing is ahead.
+        steep = np.where(turn > STEEP, turn - STEEP, 0.0)
+        middle = (every[:, k - 1 : k + n - 2] + routes[:, 1:]) / 2.0
+        off = np.linalg.norm(own[:, :-1] - middle, axis=2) / self.arm.most_radius
+        worth = np.where(wide > 0.0, wide, 5.0 * (wide - 1.0))
+        # The first bit of room counts most.
+        some, none = 1.0 - (1.0 - chords) ** 4, 10.0 * np.maximum(chords, -1.0)
+        worth += np.where(chords > 0.0, some, none)
+        worth = ROOM * worth - STEEP_COST * steep**2
+        worth[:, :-1] -= off
+        kept = ~(turn > STEEPEST) & (chords >= 0.0)
+        return worth, lines < 0.0, kept
+
+    def _spare(self, begins: FloatArray, ends: FloatArray) -> FloatArray:
+        """Room on lines over what is worth having, from `DEEPEST` to 1; [-]."""
+        # Most ways are the last one but for some stretches.
+        own = (begins != begins[-1]).any(axis=2) | (ends != ends[-1]).any(axis=2)
+        own[-1] = True
+        spare = np.zeros(own.shape)
+        spare[own] = self.room.spare(begins[own], ends[own])
+        spare = np.where(own, spare, spare[-1])
+        return np.clip(spare / self.wanted, DEEPEST, 1.0)
 
 
 def _chords(
     arm: Manipulator, route: FloatArray, inner: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Points of a way a link before and behind others, shape (n, 3) each; [m].
+) -> tuple[IntArray, IntArray]:
+    """Points of a way a link before and behind others, shape (n,) each.
 
     The link is the longest that passes there on the way.
     """
@@ -173,7 +290,7 @@ def _chords(
     link = np.maximum.accumulate(back)[passing]
     first = np.minimum(np.searchsorted(along, at - link), inner - 1)
     last = np.clip(np.searchsorted(along, at + link), inner + 1, len(route) - 1)
-    return route[first], route[last]
+    return first, last
 
 
 def resampled(route: FloatArray, spacing: float) -> FloatArray:

@@ -23,7 +23,8 @@ from vdsm_pin.problem.scene import Obstacle, covers_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 STEP: Final = 1e-6
-"""More than rounding takes from a distance, also beside nearly parallel edges; [m]."""
+"""More than rounding takes from a distance beside an arm of some metres, also beside
+nearly parallel edges; [m]."""
 FLAT: Final = 1e-9
 """Height of a triangle, over its coordinates, below which rounding turns it; [-]."""
 CROWD: Final = 4
@@ -70,12 +71,14 @@ class Surfaces:
         groups: Of these.
         solids: The meshes that have an inside.
         covers: What `encloses` asks of their pieces.
+        step: More than rounding takes from a distance, see `STEP`; [m].
     """
 
     triangles: Triangles
     groups: Groups
     solids: PackedPieces
     covers: IntArray
+    step: float = STEP
 
     def least(
         self,
@@ -100,26 +103,27 @@ class Surfaces:
         """
         if not len(self.triangles.corners):
             return np.full(len(ends), np.inf)
-        reach = enough + STEP
+        reach = enough + self.step
         bound = nearest_triangles(
             self.triangles, self.groups, ends, floor, reach, deadline.end
         )
         deadline.check()
-        bound -= STEP
-        bound[bound < floor - STEP] = -np.inf
+        bound -= self.step
+        bound[bound < floor - self.step] = -np.inf
         bound[buried(self.solids, self.covers, ends, bound > 0.0)] = -np.inf
         return bound
 
 
-def surfaces_of(obstacles: tuple[Obstacle, ...]) -> Surfaces:
-    """The surfaces of all meshes."""
+def surfaces_of(obstacles: tuple[Obstacle, ...], step: float = STEP) -> Surfaces:
+    """The surfaces of all meshes, and what is taken off a distance; [m]."""
     meshes = [obstacle for obstacle in obstacles if isinstance(obstacle, Mesh)]
     corners = np.concatenate([np.zeros((0, 3, 3)), *(m.pieces.corners for m in meshes)])
     corners = corners[coherent_order(corners.mean(axis=1))]
     solid = [mesh for mesh in meshes if mesh.has_inside]
     pieces = pack_pieces([mesh.pieces for mesh in solid])
     triangles = Triangles(corners, _planes(corners), _new_edges(corners))
-    return Surfaces(triangles, _groups(corners), pieces, covers_of(solid, pieces))
+    covers = covers_of(solid, pieces)
+    return Surfaces(triangles, _groups(corners), pieces, covers, step)
 
 
 def _new_edges(corners: FloatArray) -> BoolArray:

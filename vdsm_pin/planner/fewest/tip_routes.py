@@ -15,9 +15,19 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase
-from vdsm_pin.planner.fewest.elastic_band import pulled, refined, resampled, shortened
+from vdsm_pin.planner.fewest.elastic_band import (
+    QUICK,
+    THOROUGH,
+    is_followed,
+    pulled,
+    refined,
+    resampled,
+    shortened,
+)
+from vdsm_pin.planner.fewest.follow_the_leader import own_curve
 from vdsm_pin.planner.fewest.tip_cells import TipCells
 from vdsm_pin.planner.fewest.tip_room import TipRoom
+from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.tolerances import TOLERANCES
@@ -43,17 +53,32 @@ class TipSpace:
         most: int,
     ) -> None:
         self.arm, self.start = problem.manipulator, problem.path.start
-        self.room = TipRoom(self.arm, clearance, required)
         self.spacing, self.most = spacing, most
+        centres = start_centres(problem)
+        self.behind = self._lain(np.concatenate([centres[-1:], own_curve(centres)]))
+        self.room = TipRoom(self.arm, clearance, required)
         self.stuck: list[FloatArray] = []
         self.known: dict[bytes, list[FloatArray]] = {}
         self.searches: dict[bytes, Iterator[FloatArray]] = {}
         self.begun: dict[bytes, tuple[TipCells, FloatArray | None]] = {}
 
+    def _lain(self, curve: FloatArray) -> FloatArray:
+        """Points on what an arm lies on, from behind its tip to a link's length back.
+
+        Args:
+            curve: From the tip on, shape (k, 3); [m].
+        """
+        points = resampled(curve, self.spacing)
+        step = float(np.linalg.norm(np.diff(points[:2], axis=0)))
+        count = int(np.ceil(self.arm.link_lengths.max() / step))
+        return points[1 : count + 1]
+
     def begun_at(self, start: FloatArray) -> "TipSpace":
         """The same from another start, shape (3,); what is avoided is so in both."""
         other = copy(self)
         other.start = start
+        far = self.arm.total_length * np.eye(3)[:1]
+        other.behind = self._lain(np.concatenate([start[None], start - far]))
         other.known, other.searches, other.begun = {}, {}, {}
         return other
 
@@ -99,9 +124,14 @@ class TipSpace:
         narrow = list[FloatArray]()
         cells, route = self._begun(goal)
         while route is not None:
-            route = resampled(shortened(self.room, route), self.spacing)
-            route = pulled(self.room, route)
-            yield refined(self.room, resampled(route, self.spacing))
+            short = resampled(shortened(self.room, route), self.spacing)
+            for effort in QUICK, THOROUGH:
+                route = pulled(self.room, short, self.behind, effort=effort)
+                route = resampled(route, self.spacing)
+                route = refined(self.room, route, self.behind, effort)
+                yield route
+                if is_followed(self.room, route, self.behind):
+                    break
             narrow.append(self.room.narrowest(route))
             cells.avoided = [*narrow, *self.stuck]
             route = cells.cheapest(start, goal)
