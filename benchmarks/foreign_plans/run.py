@@ -1,8 +1,9 @@
 """Judge OMPL's plans: python -m benchmarks.foreign_plans.run --per-set K --save FILE.
 
 Needs the extra `ompl`, and VDSM_MOTION_BENCH_MAKER in the environment (see
-docs/robots.md). OMPL's random numbers run on from problem to problem: the same K and
-the same versions give the same plans. `--plans` keeps them, `--again` judges them.
+docs/robots.md). OMPL's random numbers begin anew with each plan: the same versions
+give the same plan where the time suffices. `--plans` keeps them, `--again` judges
+them.
 """
 
 import argparse
