@@ -168,6 +168,9 @@ PLAIN: Final[Mapping[str, str]] = MappingProxyType(
 )
 """The errors that are one number, with their units."""
 
+NO_ERRORS: Final = ErrorBox()
+"""The motion itself."""
+
 
 class TypedErrorBox(ErrorBox):
     """How far the real motion may stray from the nominal one, as people state it.

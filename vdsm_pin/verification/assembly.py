@@ -11,7 +11,7 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import HalfSpace
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.error_boxes import NO_ERRORS, ErrorBox
 from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.error_box import ErrorBox as ProofBox
@@ -210,7 +210,7 @@ def obstacle_growth(obstacles: Sequence[Obstacle], errors: ErrorBox) -> list[flo
     Raises:
         InvalidInput: If a half-space may be turned.
     """
-    if errors == ErrorBox():
+    if errors == NO_ERRORS:
         return [0.0] * len(obstacles)
     found = []
     for obstacle in obstacles:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.error_boxes import NO_ERRORS, ErrorBox
 from vdsm_pin.proof.bodies import Pair as ProofPair
 from vdsm_pin.proof.bodies import PairTable
 from vdsm_pin.proof.paths import Path
@@ -231,7 +231,7 @@ def find_counterexamples(
         OutOfTime: If the time is over.
     """
     outer, verdict, found = motion.asked.outer, least.verdict, list[Counterexample]()
-    for mine in () if motion.errors == ErrorBox() else (outer, ~outer):
+    for mine in () if motion.errors == NO_ERRORS else (outer, ~outer):
         if (verdict[mine] == REFUTED).any():
             continue
         among = np.flatnonzero(mine & (verdict == UNDECIDED))

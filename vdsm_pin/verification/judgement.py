@@ -5,7 +5,7 @@ from functools import cached_property, partial
 from typing import Final
 
 from vdsm_pin.problem.any_problem import AnyProblem
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.error_boxes import NO_ERRORS
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -73,10 +73,11 @@ class Judgement:
     def nearest(self) -> dict[int, ClosestApproach]:
         """The pairs that come nearest, by their numbers."""
         asked, least = self.proof.motion.asked, self.least
-        return {
-            k: replace(one, deeper=_is_deepest(asked, least, k, one.upper))
-            for k, one in nearest_pairs(asked.pairs, asked.outer, least).items()
-        }
+        found = nearest_pairs(asked.pairs, asked.outer, least)
+        for k, one in found.items():
+            if _is_deepest(asked, least, k, one.upper):
+                found[k] = replace(one, deeper=True)
+        return found
 
 
 def judge_clearance(
@@ -100,7 +101,7 @@ def judge_clearance(
         deadline: When to give up.
         contacts: Whether to look for when bodies first and last come too close.
     """
-    asked, nominal = proof.motion.asked, proof.motion.under(ErrorBox())
+    asked, nominal = proof.motion.asked, proof.motion.under(NO_ERRORS)
     name = "search for counterexamples"
     found = extras.take(name, (), proof.counterexamples, deadline)
     clear = bool(found) and extras.take(NOMINAL, False, _is_clear, nominal, deadline)

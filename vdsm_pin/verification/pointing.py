@@ -19,7 +19,7 @@ import numpy as np
 from vdsm_pin.arm.kinematics import row_centres
 from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.error_boxes import NO_ERRORS, ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import AimError, angles_between
 from vdsm_pin.problem.trajectory import Trajectory
@@ -35,7 +35,6 @@ ROUNDS: Final = 24
 """Halvings of a slice at which it is left undecided."""
 NARROW: Final = 1e-3
 """Width to which the largest angle is told; [rad]."""
-NO_ERRORS: Final = ErrorBox()
 ROUNDING: Final = 1e-12
 """Bound of all rounding in an angle to a vector of a metre; [rad m]."""
 
