@@ -52,6 +52,28 @@ def test_a_library_is_imported_whole_before_the_end_is_told(
     assert 0.3 <= time.monotonic() - begun < 5.0
 
 
+def test_a_program_that_is_imported_is_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The import that a limit stands in is not one that it waits for."""
+    program = """
+import time
+from vdsm_pin.errors import OutOfTime
+from vdsm_pin.time_limit import GRACE, Deadline, enforced
+end, told = time.monotonic() + 2.0, False
+try:
+    with enforced(Deadline(2.0, time.monotonic() - GRACE + 0.1)):
+        while time.monotonic() < end:
+            pass
+except OutOfTime:
+    told = True
+"""
+    (tmp_path / "limited_program.py").write_text(program)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert importlib.import_module("limited_program").told
+    del sys.modules["limited_program"]
+
+
 def test_who_takes_it_for_a_failure_is_interrupted_again() -> None:
     heard = []
     soon = Deadline(2.0, time.monotonic() - GRACE + 0.5)

@@ -8,6 +8,7 @@ interrupted by `enforced` a little later.
 """
 
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -86,9 +87,12 @@ SOON: Final = 0.02
 """While a library is imported the end is told again so much later; [s]."""
 
 
-def _imports(frame: FrameType | None) -> bool:
-    """Whether what runs is a part of an import."""
-    while frame is not None:
+def _imports(frame: FrameType | None, caller: FrameType) -> bool:
+    """Whether what runs is a part of an import that the caller or its work began.
+
+    The caller itself may run while it is imported: that import does not count.
+    """
+    while frame is not None and frame is not caller:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True
         frame = frame.f_back
@@ -116,11 +120,11 @@ def enforced(deadline: Deadline, grace: float = GRACE) -> Iterator[None]:
         yield
         return
 
-    rung = False
+    rung, caller = False, sys._getframe(2)  # past contextlib's own
 
     def ring(_: int, frame: FrameType | None) -> None:
         nonlocal rung
-        if _imports(frame):
+        if _imports(frame, caller):
             signal.setitimer(signal.ITIMER_REAL, SOON, AGAIN)
             return
         rung = True
