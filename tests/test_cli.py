@@ -387,7 +387,7 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
         "expected a file": ["plan", folder, "--out", out],
         f"try {named}": ["plan", named.parent, "--out", out],
         "trajectory.csv: ends in none of .html": ["view", good, "--html", rows],
-        "trajectory.csv: ends in none of .pdf": [*verify, rows, "--pdf", rows],
+        "file: ends in none of .pdf": [*verify, rows, "--pdf", file],
         "text.yaml": ["plan", text, "--out", out],
         "file: is a file, expected a folder": ["plan", good, "--out", file],
         "unknown strategy": ["plan", good, "--out", out, "--strategy", "luck"],

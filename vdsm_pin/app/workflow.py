@@ -28,6 +28,7 @@ from vdsm_pin.report.browser import find_browser, print_page
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import (
+    check_ending,
     check_kept,
     check_output_file,
     check_output_folder,
@@ -255,11 +256,12 @@ def _check_outputs(order: VerifyOrder) -> None:
     check_output_folder(order.folder)
     alone = [file for file in (order.certificate, order.pdf) if file is not None]
     for file in alone:
-        check_output_file(file, *([".pdf"] if file is order.pdf else []))
+        check_output_file(file)
     outputs = [*(order.folder / name for name in JUDGED), *alone]
     beside = order.trajectory.parent / PLAN
     check_kept(outputs, [*order.problem.files, order.trajectory, beside])
     if order.pdf is not None:
+        check_ending(order.pdf, ".pdf")
         find_browser()
 
 

@@ -36,18 +36,24 @@ def check_output_folder(folder: Path) -> None:
         raise InvalidFile(file=nearest, problem="is not writable")
 
 
-def check_output_file(path: Path, *endings: str) -> None:
-    """Refuse an output file that cannot be written, before any work is done.
-
-    A file of another kind, named by mistake, is not replaced.
+def check_ending(path: Path, *endings: str) -> None:
+    """Refuse a file of another kind, named by mistake: it would be replaced.
 
     Raises:
-        InvalidFile: If it has none of the endings that are given, is a folder or a
-            special file, or its folder cannot take files.
+        InvalidFile: If it has none of the endings.
+    """
+    if path.suffix.lower() not in endings:
+        raise InvalidFile(file=path, problem=f"ends in none of {', '.join(endings)}")
+
+
+def check_output_file(path: Path) -> None:
+    """Refuse an output file that cannot be written, before any work is done.
+
+    Raises:
+        InvalidFile: If it is a folder or a special file, or its folder cannot take
+            files.
     """
     check_replaceable(path)
-    if endings and path.suffix.lower() not in endings:
-        raise InvalidFile(file=path, problem=f"ends in none of {', '.join(endings)}")
     check_output_folder(path.parent)
 
 
