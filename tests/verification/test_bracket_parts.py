@@ -806,3 +806,32 @@ def test_no_ball_is_looked_for_when_time_is_over() -> None:
         np.testing.assert_array_equal(getattr(found, name), getattr(least, name))
     with pytest.raises(AttributeError):  # it asks for poses otherwise
         clearances.with_depths(motion, least)
+
+
+def test_common_balls_are_looked_for_in_few_pairs_of_those_that_meet(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Undecided ones first, then the nearest of those that nothing grows."""
+    n = 3 * clearances.MOST
+    rng = np.random.default_rng(3)
+    verdict = np.where(np.arange(n) % 3 == 0, UNDECIDED, REFUTED)
+    upper, zeros, points = -rng.uniform(0.0, 1.0, n), np.zeros(n), np.zeros((n, 3))
+    rows = np.zeros(n, np.int64), zeros, zeros - 2.0, upper, verdict, points, points
+    looked = list[int]()
+
+    def noted(k: int, *_: object) -> tuple[float, object]:
+        looked.append(k)
+        return 0.0, None
+
+    monkeypatch.setattr(clearances, "_placed", lambda _, k, at: (k, at))
+    monkeypatch.setattr(clearances, "_moments", lambda *_: iter([0.0]))
+    monkeypatch.setattr(clearances, "common_ball", noted)
+    asked = SimpleNamespace(ball=lambda k: 0.1 * (k % 3 == 1))
+    motion: Any = SimpleNamespace(asked=asked, span=np.array([0.0, 1.0]))
+    clearances.with_depths(motion, LeastClearances(*rows))
+    first = sorted(range(0, n, 3), key=lambda k: upper[k])
+    assert looked == first[: clearances.MOST]
+    verdict[verdict == UNDECIDED], looked[:] = REFUTED, []
+    clearances.with_depths(motion, LeastClearances(*rows))
+    even = [k for k in range(n) if k % 3 != 1]
+    assert looked == sorted(even, key=lambda k: upper[k])[: clearances.MOST]

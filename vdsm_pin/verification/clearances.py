@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from vdsm_pin.verification.contacts import (
     seeming_depth,
 )
 from vdsm_pin.verification.moving import Knots
+
+MOST: Final = 32
+"""Pairs in which common balls are looked for: undecided ones, then the nearest."""
 
 
 def least_clearances(asked: Assembly, proof: Proof) -> LeastClearances:
@@ -61,9 +64,12 @@ def with_depths(
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
     span = motion.span if span is None else span
     changed = dict[int, tuple[Any, ...]]()
-    for k in np.flatnonzero(near).tolist():
-        if least.verdict[k] == REFUTED and motion.asked.ball(k) > 0.0:
-            continue
+    lost = least.verdict == REFUTED
+    known = np.flatnonzero(near & lost).tolist()
+    near[[k for k in known if motion.asked.ball(k) > 0.0]] = False
+    pairs = np.flatnonzero(near)
+    first = np.lexsort([least.upper[pairs], lost[pairs]])[:MOST]
+    for k in pairs[first].tolist():
         moment = least.interval[k] + least.share[k]
         middle = 0.5 * (least.link_point[k] + least.other_point[k])
         for at in _moments(motion, k, moment, middle, span, deadline):
