@@ -325,6 +325,7 @@ def test_an_arm_far_from_an_open_mesh_is_outside_whatever_its_inside(
 ) -> None:
     assert hold(tmp_path, bowl(-0.1)) == "certified"
     lines = certificate_lines(tmp_path / "c.certificate")
+    assert lines[0]["pieces"] == {}
     outer = lines[1]["proofs"][:2]  # of the links and the mesh
     planes = [plane for proof in outer for _, _, some in proof for plane in some]
     assert {(first, last) for first, last, *_ in planes} == {(0, 10)}

@@ -149,20 +149,22 @@ def _proved(
     hulled = unlocated(located_at_start(motion))
     question = question_of_hulls(motion, hulled) if hulled else motion.question
     proving, places = question.about(motion.path, budget), question.places
-    meshes, pieces = (
-        dict.fromkeys(asked.table.one[hulled].tolist()),
-        proving.task.pieces,
-    )
+    meshes = dict.fromkeys(asked.table.one[hulled].tolist())
+    pieces = proving.task.pieces
     whole = np.zeros(len(pieces.root), np.int64)
     for place, number in zip(places[len(bodies) :], meshes, strict=True):
         whole[place] = len(bodies[number].pieces)
     own, others = places[: len(asked.own)], places[len(asked.own) : len(bodies)]
     obstacles = [*zip(others, asked.scene.obstacles, strict=True)]
+    # Of a mesh that every pair is held off by its hull no plane counts the triangles.
+    by_hull = {*meshes} - {*np.delete(asked.table.one, hulled).tolist()}
+    names = {bodies[number].name for number in by_hull}
+    counted = [one for one in obstacles if one[1].name not in names]
     links = zip((body.name for body in asked.own), covers, strict=True)
     return {
         **hashes.as_json(),
         "pairs": _pairs(question.plan, len(places)),
-        "pieces": pieces_of_obstacles(obstacles, pieces),
+        "pieces": pieces_of_obstacles(counted, pieces),
         "joined": joined_corners(asked.scene),
         "links": {
             **dict(link_pieces(links, own, pieces)),
