@@ -87,8 +87,9 @@ class Sampled:
         step = self.levers @ np.abs(b - a) / steps
         at = 0
         while at <= steps:
-            away = self.clearance(a + at / steps * (b - a))
-            if away <= 0.0:
+            q = a + at / steps * (b - a)
+            away = self.clearance(q)
+            if away <= 0.0 and self.collides(q):
                 return True
             at += max(1, int(away / step)) if step > 0.0 else steps
         return False
