@@ -13,7 +13,6 @@ import pytest
 from test_outputs import PART, PROBLEM
 
 from vdsm_pin.cli import main
-from vdsm_pin.cli.ending import fail
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.source import bounded_lines
 from vdsm_pin.text import LONGEST, printable
@@ -86,17 +85,3 @@ def test_an_endless_line_is_not_read(tmp_path: Path) -> None:
     assert next(lines) == b"short\n"
     with pytest.raises(InvalidFile, match=r"line 2: is longer than"):
         next(lines)
-
-
-@pytest.mark.parametrize(("wrong", "more"), [(20, 0), (21, 1), (600, 580)])
-def test_of_very_many_errors_in_a_file_the_first_are_told(
-    wrong: int, more: int, capsys: pytest.CaptureFixture[str]
-) -> None:
-    error = InvalidFile(file="a.yaml", problem="is wrong")
-    error.others = (InvalidFile(file="a.yaml", problem="too"),) * (wrong - 1)
-    with pytest.raises(SystemExit) as ended:
-        fail(error, 2)
-    assert ended.value.code == 2
-    told = capsys.readouterr().err.splitlines()
-    assert told[:2] == ["vdsm: a.yaml: is wrong", "vdsm: a.yaml: too"]
-    assert told[20:] == [f"vdsm: {more} more errors"] * bool(more)

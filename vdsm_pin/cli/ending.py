@@ -15,19 +15,12 @@ PIPE_CLOSED: Final = 141
 """As a shell reports whoever is ended by SIGPIPE; all files are written by then."""
 
 
-MOST_TOLD: Final = 20
-"""Errors of one file that are told; of more their number."""
-
-
 def fail(error: Exception, status: int) -> NoReturn:
     """Say what went wrong, each part on a line of its own on a terminal, and end."""
     with suppress(OSError):  # of a disk that is full, say; the status still tells
         between = "\n  " if sys.stderr.isatty() else "; "
-        every = (error, *getattr(error, "others", ()))
-        for one in every[:MOST_TOLD]:
+        for one in (error, *getattr(error, "others", ())):
             typer.echo(printable(f"vdsm: {one}").replace("; ", between), err=True)
-        if more := len(every[MOST_TOLD:]):
-            typer.echo(f"vdsm: {more} more errors", err=True)
     sys.exit(status)
 
 
