@@ -243,6 +243,27 @@ class StartBlocked(Infeasible):
         super().__init__(message)
 
 
+class StartFolded(Infeasible):
+    """Two bodies of the arm are too close to each other as it starts.
+
+    Args:
+        pair: Both in words.
+        clearance: Between the two, at most; [m].
+        required: What it must be; [m].
+        deeper: Whether the clearance is that deep or deeper.
+    """
+
+    def __init__(
+        self, *, pair: str, clearance: float, required: float, deeper: bool
+    ) -> None:
+        self.pair, self.clearance, self.required = pair, clearance, required
+        super().__init__(
+            f"at its start {pair} of the arm have "
+            f"{clearance_words(clearance, deeper)}, required are {in_mm(required)}; "
+            "`ignore_pairs` leaves out what may touch"
+        )
+
+
 class StartInside(Infeasible):
     """The arm as it starts is inside a mesh."""
 

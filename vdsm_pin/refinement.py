@@ -39,6 +39,7 @@ from vdsm_pin.verification.robust import (
     refuted_joint_error,
     sturdiest,
 )
+from vdsm_pin.verification.start_links import check_links_at_start
 from vdsm_pin.verification.verify import verify
 
 MAX_ROUNDS: Final = 8
@@ -136,6 +137,7 @@ def _plan_at_rest(
         message = f"strategy {strategy_name!r} does not read ratios, which 'paper' does"
         raise NoPlanFound(message)
     known = within_feed(with_known_insides(with_path(problem)))
+    check_links_at_start(known.problem, deadline)
     clearance = within_time(link_clearance(known.problem), deadline)
     rounds: list[Round] = []
     margins = np.zeros((problem.manipulator.n_links, len(problem.scene.obstacles)))
