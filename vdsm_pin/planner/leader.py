@@ -16,7 +16,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
-from vdsm_pin.planner.spacing import stepped
+from vdsm_pin.planner.spacing import STRAYS, row_steps, stepped
 from vdsm_pin.planner.start import check_start, start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -57,8 +57,11 @@ def plan_follow_the_leader(
         _check_rail(problem, centres, tips)
         alpha, theta = joint_angles(arm, centres)
         _check_cone(problem, link_angles(alpha, theta), tips)
-        turn = np.abs(np.diff(np.stack([alpha, theta]), axis=1)).max(initial=0.0)
-        if turn <= problem.planned_row_change or parts == FINEST:
+        turns, strays = row_steps(arm, alpha, theta)
+        strays = strays[on_path[:-1]].max(initial=0.0)
+        near = strays <= STRAYS * problem.path.spacing
+        turn = turns.max(initial=0.0)
+        if (turn <= problem.planned_row_change and near) or parts == FINEST:
             break
         parts *= 2
     trajectory = Trajectory(on_path, along, centres[:, 0, 0], alpha, theta)

@@ -1,10 +1,17 @@
 """How close rows of a trajectory must be."""
 
+from typing import Final
+
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.tolerances import TOLERANCES
+
+STRAYS: Final = 0.95
+"""Share of the spacing that the tip may stray from a straight line, by its bound; [-].
+
+Verifiers ask for the whole, what the tip is off at the waypoints included."""
 
 
 def count_of(parts: FloatArray) -> IntArray:

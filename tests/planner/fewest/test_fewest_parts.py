@@ -21,6 +21,7 @@ from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
 from vdsm_pin.planner.impossible.bounds import prove_tips
+from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -373,3 +374,21 @@ def test_rows_crowd_where_a_stretched_arm_is_drawn_back() -> None:
     assert steps.max() <= turn
     assert len(rows.share) < 1000
     assert np.diff(rows.share).max() > 20.0 * np.diff(rows.share).min()
+
+
+@pytest.mark.parametrize("spacing", [1e-4, 3e-4, 1e-3])
+def test_the_bound_of_the_tips_way_between_drawn_rows_is_within_the_spacing(
+    spacing: float,
+) -> None:
+    """Links swing to and fro while the tip creeps: far less happens to it than may."""
+    arm = replace(ARM, base_range=(-9.0, 9.0))
+    offsets = np.zeros((2, arm.n_links + 1, 2))
+    offsets[1, 1:-1:2, 0], offsets[1, 2:-1:2, 0] = 0.02, -0.02
+    tips = np.array([[3.0, 0.0, 0.0], [3.0 + 2.0 * spacing, 0.0, 0.0]])
+    some = Corners(
+        tips, offsets, np.zeros(2), np.ones(1, dtype=np.bool_), np.full((1, 2), -1)
+    )
+    rows = dense_rows(arm, some, spacing, np.deg2rad(4.9), 1.0)
+    _, bound = row_steps(arm, *joint_angles(arm, rows.centres))
+    assert bound.max() <= spacing
+    assert len(rows.share) < 200

@@ -22,7 +22,7 @@ from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.direction_kernels import placed_between
 from vdsm_pin.planner.fewest.pose_kernels import Lines, centres_between, knees_between
-from vdsm_pin.planner.spacing import count_of, row_steps, spread
+from vdsm_pin.planner.spacing import STRAYS, count_of, row_steps, spread
 from vdsm_pin.tolerances import TOLERANCES
 
 MOST_MORE, SOME_MORE = 20, 100_000
@@ -201,7 +201,8 @@ def dense_rows(
     """Rows close enough that straight lines in joint space follow the chart.
 
     Every corner is a row. Midway between two rows the tip strays from the path it draws
-    by no more than `TOLERANCES.planned_stray`.
+    by no more than `TOLERANCES.planned_stray`, and by a bound that verifiers know
+    nowhere between them by more than the spacing.
 
     Args:
         manipulator: The arm.
@@ -223,7 +224,7 @@ def dense_rows(
             break
         rows = rows_at(manipulator, corners, *spread(counts))
         excess = np.zeros(len(counts))
-        each = _excess(manipulator, corners, rows, turn, stray)
+        each = _excess(manipulator, corners, rows, (spacing, turn, stray))
         np.maximum.at(excess, rows.interval[:-1], each)
         if (excess <= 1.0).all():
             return rows
@@ -232,7 +233,7 @@ def dense_rows(
     # Near a stretched arm angles go with the root of the way: rows crowd at its end.
     rows = rows_at(manipulator, corners, *spread(np.where(excess > 1.0, asked, counts)))
     for _ in range(ROUNDS):
-        each = _excess(manipulator, corners, rows, turn, stray)
+        each = _excess(manipulator, corners, rows, (spacing, turn, stray))
         if (each <= 1.0).all():
             return rows
         parts = np.ceil(np.maximum(each, 1.0) ** 2).astype(np.int64)
@@ -259,15 +260,23 @@ def _cut(rows: Rows, parts: IntArray) -> tuple[IntArray, FloatArray]:
 
 
 def _excess(
-    manipulator: Manipulator, corners: Corners, rows: Rows, turn: float, stray: float
+    manipulator: Manipulator,
+    corners: Corners,
+    rows: Rows,
+    most: tuple[float, float, float],
 ) -> FloatArray:
-    """How many times as far as a row may each step turns or strays, shape (r - 1,)."""
+    """How many times as far as a row may each step turns or strays, shape (r - 1,).
+
+    `most` has spacing, turn and stray of `dense_rows`.
+    """
+    spacing, turn, stray = most
     alpha, theta = joint_angles(manipulator, rows.centres)
-    step, _ = row_steps(manipulator, alpha, theta)
+    step, bound = row_steps(manipulator, alpha, theta)
     strays = _stray(manipulator, corners, rows, alpha, theta)
     # Straying falls with the square of the distance of the rows.
     bow = np.sqrt(strays.max(axis=1) / stray)
-    tip = np.sqrt(strays[:, -1] / TOLERANCES.planned_stray)
+    proved = bound / (STRAYS * spacing)
+    tip = np.sqrt(np.maximum(strays[:, -1] / TOLERANCES.planned_stray, proved))
     bow = np.where(corners.drawn[rows.interval[:-1]], np.maximum(bow, tip), bow)
     return np.asarray(np.maximum(step / turn, bow))
 
