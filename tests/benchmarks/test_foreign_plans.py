@@ -132,7 +132,8 @@ def test_states_passed_over_are_clear(folder: Path, tmp_path: Path) -> None:
     """Of random motions the same is said as by asking about every state."""
     (problem,) = problems("panda", 1, tmp_path / "aside")
     sampled, rng = Sampled("panda", problem.scene), np.random.default_rng(5)
-    assert np.allclose(sampled.levers, [0.4 + 0.1 + 0.4, 0.4], rtol=0.2)
+    reach = 0.2 + np.sqrt(0.2**2 + 2.0 * 0.02**2)  # a ball about each box
+    np.testing.assert_allclose(sampled.levers, [np.hypot(0.4, 0.1) + reach, reach])
     found = []
     for _ in range(60):
         a, b = rng.uniform(-0.4, 0.9, (2, 2))
