@@ -388,6 +388,12 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
         f"try {named}": ["plan", named.parent, "--out", out],
         "trajectory.csv: ends in none of .html": ["view", good, "--html", rows],
         "file: ends in none of .pdf": [*verify, rows, "--pdf", file],
+        "trajectory.csv: ends in none of .certificate, .jsonl, no ending": [
+            *(*verify, rows, "--certificate", folder / "other" / "trajectory.csv")
+        ],
+        "notes.md: ends in none of .urdf, .xml": [
+            *("urdf", "hrm8", "--out", folder / "notes.md")
+        ],
         "text.yaml": ["plan", text, "--out", out],
         "file: is a file, expected a folder": ["plan", good, "--out", file],
         "unknown strategy": ["plan", good, "--out", out, "--strategy", "luck"],

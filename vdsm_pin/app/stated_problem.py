@@ -10,7 +10,13 @@ import yaml
 
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.report.folder import check_kept, check_output_file, problem_beside
+from vdsm_pin.report.folder import (
+    CERTIFICATES,
+    check_ending,
+    check_kept,
+    check_output_file,
+    problem_beside,
+)
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.units import MM_PER_M
@@ -102,6 +108,7 @@ def stated_cell(
     for output in (certificate, path):
         check_output_file(output)
     check_kept([certificate, path], [*cell.files, motion])
+    check_ending(certificate, *CERTIFICATES)
     text = problem_text(cell, files, scene, path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -28,6 +28,7 @@ from vdsm_pin.report.browser import find_browser, print_page
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import (
+    CERTIFICATES,
     check_ending,
     check_kept,
     check_output_file,
@@ -260,6 +261,8 @@ def _check_outputs(order: VerifyOrder) -> None:
     outputs = [*(order.folder / name for name in JUDGED), *alone]
     beside = order.trajectory.parent / PLAN
     check_kept(outputs, [*order.problem.files, order.trajectory, beside])
+    if order.certificate is not None:
+        check_ending(order.certificate, *CERTIFICATES)
     if order.pdf is not None:
         check_ending(order.pdf, ".pdf")
         find_browser()

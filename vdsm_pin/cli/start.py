@@ -113,7 +113,7 @@ def urdf(
     from vdsm_pin.arm.urdf_writer import mesh_names, urdf_text
     from vdsm_pin.io.atomic import atomic_path
     from vdsm_pin.io.problem_file import built_in_names
-    from vdsm_pin.report.folder import check_kept, check_output_file
+    from vdsm_pin.report.folder import check_ending, check_kept, check_output_file
     from vdsm_pin.report.solids import obj_text
 
     known = name in BUILT_IN or name in built_in_names() or Path(name).exists()
@@ -130,6 +130,7 @@ def urdf(
     for file in (out, *files):
         check_output_file(file)
     check_kept((out, *files), () if problem is None else problem.files)
+    check_ending(out, ".urdf", ".xml")
     for file, content in {**files, out: text}.items():
         with atomic_path(file) as path:
             path.write_text(content, encoding="utf-8")

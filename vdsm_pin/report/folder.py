@@ -16,6 +16,10 @@ UNFINISHED: Final = ".vdsm-unfinished-"
 """What the names of temporary folders begin with."""
 
 
+CERTIFICATES: Final = ".certificate", ".jsonl", ""
+"""How the files of certificates end."""
+
+
 def problem_beside(certificate: Path) -> Path:
     """Where the problem file stands that a certificate is about, of a robot alone."""
     return certificate.parent / f"{certificate.name}.yaml"
@@ -40,10 +44,11 @@ def check_ending(path: Path, *endings: str) -> None:
     """Refuse a file of another kind, named by mistake: it would be replaced.
 
     Raises:
-        InvalidFile: If it has none of the endings.
+        InvalidFile: If it has none of the endings; "" stands for a name without one.
     """
     if path.suffix.lower() not in endings:
-        raise InvalidFile(file=path, problem=f"ends in none of {', '.join(endings)}")
+        known = ", ".join(ending or "no ending" for ending in endings)
+        raise InvalidFile(file=path, problem=f"ends in none of {known}")
 
 
 def check_output_file(path: Path) -> None:
