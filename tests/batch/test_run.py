@@ -6,6 +6,7 @@ Timing files are the only ones that may differ.
 import contextlib
 import fcntl
 import random
+import re
 import resource
 import shutil
 import signal
@@ -87,6 +88,28 @@ def test_every_problem_has_its_row_and_its_folder(reference: Path) -> None:
     (suite,) = junitparser.JUnitXml.fromfile(str(reference / "junit.xml"))
     assert (suite.tests, suite.failures, suite.errors) == (4, 1, 1)
     assert not (reference / ".unfinished").exists()
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_problem_has_one_name_in_progress_table_junit_and_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_problem(tmp_path / "stem.yaml", NEAR.replace("near", "its own name"))
+    given, out = (
+        ("paper/free", str(tmp_path / "stem.yaml"), "none.yaml"),
+        tmp_path / "o",
+    )
+    run_batch(Batch(given, out, Settings("paper")))
+    names = {"paper-free", "stem", "none"}
+    assert {path.name for path in out.iterdir() if path.is_dir()} == names
+    said = capsys.readouterr().out.splitlines()
+    assert {line.split("]")[1].split()[2] for line in said} == names
+    (suite,) = junitparser.JUnitXml.fromfile(str(out / "junit.xml"))
+    assert {case.name for case in suite} == names
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert set(re.findall(r'<th scope="row" data-key="([^"]*)"', page)) == names
+    rows = {row.folder: row.problem for row in read_summary(out / "summary.csv")}
+    assert rows == dict(zip(("paper-free", "stem", "none"), given, strict=True))
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -40,6 +40,7 @@ from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, TimingFile
 from vdsm_pin.report.picture import picture
 from vdsm_pin.report.words import TIME_LIMIT
+from vdsm_pin.text import printable
 from vdsm_pin.time_limit import Deadline, enforced
 from vdsm_pin.verification.records import Verdict
 
@@ -144,7 +145,8 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
     drawing = picture(verified.records)
     (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
     row = batch_row(task.final.name, task.strategy, verified.file)
+    known = {"problem": printable(task.problem)}
     # The planner knows why it left something out, the verification does not.
     if plan is not None and plan.verdict == row.outcome == "incomplete":
-        return row.model_copy(update={"reason": plan.reason})
-    return row
+        known["reason"] = plan.reason
+    return row.model_copy(update=known)

@@ -148,8 +148,11 @@ class PlanFile(FileModel):
 class BatchRow(FileModel):
     """One problem of a batch; what summary.csv shows."""
 
-    folder: str = Field(description="folder of its files")
-    problem: str = Field(description=_PROBLEM)
+    folder: str = Field(
+        description="folder of its files, whose name stands for it in progress, table, "
+        "JUnit and diff"
+    )
+    problem: str = Field(description="as it was given: built-in name or file")
     strategy: str = Field(description=_STRATEGY)
     outcome: OutcomeWord = Field(
         description="the verdict, or why there is none: infeasible, error, time-limit"

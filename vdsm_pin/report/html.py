@@ -2,7 +2,6 @@
 
 import hashlib
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
@@ -261,11 +260,9 @@ def write_index(path: Path, rows: Sequence[BatchRow], pages: Mapping[str, str]) 
     """
     counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
     passed = sum(count for word, count in counts.items() if outcome(word).passed)
-    names = Counter(row.problem for row in rows)
     page = rendered(
         "index.html.j2",
         rows=rows,
-        repeated={name for name, times in names.items() if times > 1},
         counts=counts,
         passed=passed,
         pages=pages,
