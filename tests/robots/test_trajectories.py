@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -531,6 +532,24 @@ def test_damaged_bags_end_in_one_sentence(
         else:
             assert np.isfinite(found.q).all()
     assert 20 < refused < 60
+
+
+def test_a_changed_byte_of_a_message_in_mcap_is_refused(
+    tmp_path: Path, robot: Robot
+) -> None:
+    """Oracle: zlib.crc32 over the chunk, as the MCAP format has it."""
+    given = motion(2)
+    file = written(tmp_path, ".mcap", given, robot)
+    whole = file.read_bytes()
+    begin = 8 + 9 + int.from_bytes(whole[9:17], "little") + 9  # magic, header, chunk
+    size = int.from_bytes(whole[begin - 8 : begin], "little")
+    records = whole[begin + 40 : begin + size]
+    assert whole[begin + 24 : begin + 28] == zlib.crc32(records).to_bytes(4, "little")
+    first = whole.index(given.q.tobytes()[:16])
+    for at in range(first, first + 16):
+        file.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        with pytest.raises(InvalidFile, match="cannot be read by rosbags: Chunk check"):
+            read_bag(file)
 
 
 def run(*arguments: object) -> int:

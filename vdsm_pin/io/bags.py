@@ -1,5 +1,7 @@
 """Trajectories in ROS 1 bags, ROS 2 bags and MCAP files, by rosbags (extra `bags`)."""
 
+import struct
+import zlib
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -32,6 +34,12 @@ MOST: Final = 10_000_000
 """Messages of a topic that are read."""
 
 TOPIC: Final = "/joint_trajectory"
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+"""An MCAP file begins and ends with it; between are records: kind, size, content."""
+
+RECORD, CHUNK = 9, 6
+"""Size of a record's head [bytes]; the kind of those that hold messages."""
 
 
 def is_bag(file: Path) -> bool:
@@ -192,10 +200,25 @@ def write_bag(motion: JointTrajectory, file: Path) -> None:
         connection = two.add_connection(TOPIC, PLANS[0], typestore=store)
         two.write(connection, 0, store.serialize_cdr(_typed(store, motion), PLANS[0]))
     (written,) = folder.glob("*.mcap")
+    written.write_bytes(_with_checksums(written.read_bytes()))
     written.replace(file)
     for left in folder.iterdir():
         left.unlink()
     folder.rmdir()
+
+
+def _with_checksums(content: bytes) -> bytes:
+    """An MCAP file with the checksum of each chunk: rosbags writes 0 and reads it."""
+    found, at = bytearray(content), len(MAGIC)
+    while at < len(content) - len(MAGIC):
+        kind, size = struct.unpack_from("<BQ", content, at)
+        at += RECORD
+        if kind == CHUNK:
+            (name,) = struct.unpack_from("<I", content, at + 28)  # of a compression: ""
+            records = content[at + 40 + name : at + size]
+            struct.pack_into("<I", found, at + 24, zlib.crc32(records))
+        at += size
+    return bytes(found)
 
 
 def _typed(store: Any, motion: JointTrajectory) -> Any:
