@@ -161,6 +161,29 @@ def test_a_door_closes_a_tenth_of_a_millimetre_too_early() -> None:
     assert np.linalg.norm(points[0, :2]) < 1.06  # on the arm's ball
 
 
+@pytest.mark.parametrize("deep", [1.1e-6, 1e-4, 1e-2])
+@pytest.mark.parametrize("at", [0.0, 0.375, 0.5])
+def test_a_contact_is_found_beside_an_instant_that_just_touches(
+    at: float, deep: float
+) -> None:
+    """Two balls pass each other on a line: at one instant they touch but for rounding.
+
+    With radii r and s, and p = r + s - deep off the line, they touch where the way to
+    the nearest place is sqrt((r + s)^2 - p^2).
+    """
+    both, p = 0.3, 0.3 - deep
+    half = np.sqrt((both - p) * (both + p))
+    slide = Joint(0, Kind.PRISMATIC, column=0, axis=(1.0, 0.0, 0.0), name="slide")
+    path = Path(np.array([[0.0], [0.09]]))
+    for sense in (1.0, -1.0):
+        x = 0.09 * at + sense * half
+        bodies = [ball(0, x, p, 0.0, 0.1), ball(1, 0.0, 0.0, 0.0, 0.2)]
+        proof = prove(Tree((slide,)), bodies, path, [Pair(0, 1, 0.0)])
+        nearest = np.hypot(x - np.clip(x, 0.0, 0.09), p) - both
+        assert (proof.verdict[0] == REFUTED) == (nearest < -1e-12)
+        assert proof.lower[0] <= nearest + 1e-12
+
+
 def test_a_spline_overshoots_between_clear_knots() -> None:
     tree, times = turning_arm(), np.array([0.0, 1.0, 2.0])
     q = np.array([[0.0], [0.5], [0.5]])

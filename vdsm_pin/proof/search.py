@@ -256,9 +256,12 @@ def resolve(
             verdict = REFUTED
             break
         # No slice can prove more than its instants: there is nothing to hope for where
-        # they fall short, or where slices already prove as much but for rounding.
-        least = witness.value[INSTANT]
-        if least < required or least - heap[0, KEY] <= rounding:
+        # slices already prove as much but for rounding, or where instants fall short
+        # of what is required. Where they do so by rounding alone, another instant may
+        # fall below it as long as slices leave room for that.
+        least, known = witness.value[INSTANT], heap[0, KEY]
+        short, nearly = required - least, required - known <= task.rules.gap
+        if least - known <= rounding or short > (0.0 if nearly else rounding):
             verdict = UNDECIDED
             break
         if count + 2 > heap.shape[0] or clock() > task.rules.until:
