@@ -21,8 +21,10 @@ from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.layouts import SLICES
 from vdsm_pin.verification import coal_check
 from vdsm_pin.verification import coal_shapes as measuring
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import Call
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -95,8 +97,10 @@ def planned() -> Trajectory:
 
 
 def test_the_proof_of_a_plan_needs_few_subdivisions(planned: Trajectory) -> None:
-    proof = prove_clearance(near(), planned, ErrorBox())
-    assert proof.slices <= 0.01 * proof.counts.sum()
+    proving = AskedMotion.of_arm(near(), planned, ErrorBox()).proving()
+    proving.run()
+    results = proving.results
+    assert results.tally[SLICES] <= 0.01 * results.counts.sum()
 
 
 def test_coal_is_asked_where_it_adds_evidence(

@@ -20,7 +20,7 @@ from benchmarks.foreign_plans.sampled import Sampled
 from benchmarks.foreign_plans.summary import document
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.scene_files import read_scene
+from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.urdf import read_robot
 
 RESOLUTIONS: Final = (0.01, 0.005)
@@ -48,7 +48,7 @@ def outcomes(
                 raise InvalidInput(message)
             key = name, problem.family, problem.number
             plans = stored.get(key, []) if stored else _planned(problem, sampled)
-            scene = read_scene(problem.scene, 1.0)
+            scene = read_scene_with_files(problem.scene, 1.0)[0]
             yield problem, [judge(plan, sampled, robot, scene) for plan in plans]
 
 

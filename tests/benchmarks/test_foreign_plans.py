@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.shortcuts import read_scene
 
 from benchmarks.foreign_plans.judges import Plan, _fault, judge
 from benchmarks.foreign_plans.problems import FOLDER, problems
@@ -16,7 +17,6 @@ from benchmarks.foreign_plans.sampled import Sampled
 from benchmarks.foreign_plans.summary import document
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.records import Verdict
 

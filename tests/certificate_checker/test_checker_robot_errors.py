@@ -17,11 +17,11 @@ from oracles.certificate_mutations import change_number
 from oracles.random_robots import MESH, random_urdf
 from oracles.robot_certificates import BASES, VIRTUAL, Made, cell, text
 from oracles.robot_samples import Errors, Sampler
+from oracles.shortcuts import read_path
 
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.robots.cell import read_cell
 from vdsm_pin.robots.files import CellScene, read_cell_file
-from vdsm_pin.robots.trajectory_files import read_path
 
 Rng = np.random.Generator
 NOTHING = CellScene(Scene(), (), ())

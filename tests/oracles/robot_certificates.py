@@ -14,6 +14,7 @@ from oracles.certificate_cases import (
     check_sealed,
     write_cube,
 )
+from oracles.shortcuts import read_path
 
 from vdsm_pin.certificate_checker import Outcome
 from vdsm_pin.certificate_writer.certificate import write_certificate
@@ -21,7 +22,6 @@ from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.robots.cell import read_cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
-from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="all">

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from oracles.shortcuts import start_proof
 from oracles.tree_queries import TreeQuery
 
 from vdsm_pin.certificate_checker.claims import Clearances
@@ -14,7 +15,6 @@ from vdsm_pin.proof.bodies import Pair as Asked
 from vdsm_pin.proof.bodies import PairTable
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
-from vdsm_pin.proof.prover import start_proof
 from vdsm_pin.proof.recording import record
 
 ROOM = 20_000

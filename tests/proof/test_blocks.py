@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from oracles.plain import plain
+from oracles.shortcuts import start_proof
 from oracles.tree_queries import random_path, random_tree, unit
 
 from vdsm_pin.geometry.arrays import FloatArray
@@ -27,7 +28,7 @@ from vdsm_pin.proof.plane_bounds import (
     place_own,
     take_disc,
 )
-from vdsm_pin.proof.prover import prove, start_proof
+from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import dense_rows
 from vdsm_pin.proof.results import own_up
 from vdsm_pin.proof.row_places import fill_rows

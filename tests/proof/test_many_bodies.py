@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from oracles.shortcuts import start_proof
 from oracles.tree_queries import (
     SHAPES,
     at,
@@ -23,7 +24,7 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.broad_phase import FEW
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import Proof, prove, start_proof
+from vdsm_pin.proof.prover import Proof, prove
 from vdsm_pin.proof.proving import dense_rows
 from vdsm_pin.proof.row_places import FEW_PLACES
 from vdsm_pin.proof.rows import BLOCK

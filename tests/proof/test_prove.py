@@ -6,6 +6,7 @@ from math import ceil, floor
 
 import numpy as np
 import pytest
+from oracles.shortcuts import start_proof
 from oracles.tree_queries import at, clearances, make_query, wrong_poses
 from some_slow import few_of
 
@@ -14,7 +15,7 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path, together
-from vdsm_pin.proof.prover import Proof, prove, start_proof, summed, verdicts_of
+from vdsm_pin.proof.prover import Proof, prove, summed, verdicts_of
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from oracles.shortcuts import start_proof
 from oracles.tree_queries import at, random_path, random_pieces, random_tree, unit
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
@@ -12,7 +13,7 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import prove, start_proof
+from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.recording import LOSS, record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.tree import Tree

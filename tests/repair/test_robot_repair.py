@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.shortcuts import read_path
 from typer.testing import CliRunner
 
 from vdsm_pin.cli import app
@@ -24,7 +25,6 @@ from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.trajectory_csv import csv_text
-from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
 
 URDF = """<robot name="two"><link name="foot"/>

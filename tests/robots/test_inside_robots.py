@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from oracles.shortcuts import read_path, read_scene
 
 from tests.oracles.certificate_cases import certificate_lines
 from tests.oracles.certificate_oracle import sealed
@@ -22,8 +23,6 @@ from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.reason import reason
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
-from vdsm_pin.robots.scene_files import read_scene
-from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.inside import LINKS_OUTSIDE
 from vdsm_pin.verification.records import Verdict

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.shortcuts import read_path
 
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
@@ -20,7 +21,6 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.judgement import verify_robot
-from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.moving import PART, Knots, in_short_parts
 from vdsm_pin.verification.records import Verdict

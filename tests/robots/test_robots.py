@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles.shortcuts import read_path, read_scene
 
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
@@ -21,9 +22,7 @@ from vdsm_pin.robots.cell import Cell, cell_of, read_cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import NEAR, verify_robot
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.second_opinion import pose_difference
-from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.clearance_check import OBSTACLES

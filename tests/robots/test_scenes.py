@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles.shortcuts import read_scene
 
 from tests.robots.test_robots import CELL, URDF, mutated, write
 from vdsm_pin.errors import InvalidFile, VdsmError
@@ -15,7 +16,6 @@ from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Mesh, Sp
 from vdsm_pin.robots import mjcf
 from vdsm_pin.robots.cell import cell_of, read_cell
 from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.scene_files import read_scene
 
 OLD = """(noname)+
 * big box

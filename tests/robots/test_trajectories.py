@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from oracles.shortcuts import read_path
 
 from tests.robots.test_robots import CELL, SCENE, URDF, mutated, write
 from vdsm_pin.cli import main
@@ -27,7 +28,7 @@ from vdsm_pin.robots.by_itself import rate_checks
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.trajectory_csv import csv_text
-from vdsm_pin.robots.trajectory_files import read_motion, read_path
+from vdsm_pin.robots.trajectory_files import read_motion
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.records import Verdict
 

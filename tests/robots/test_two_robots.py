@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oracles.certificate_cases import write_cube
 from oracles.random_robots import MESH, random_urdf
+from oracles.shortcuts import read_path
 
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
@@ -26,7 +27,6 @@ from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.files import HULLS, MeshCover, RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.trajectory_csv import csv_text
-from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.coal_pairs import link_shapes
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides

@@ -12,7 +12,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.contact_search import contacts_of
+from vdsm_pin.verification.first_contact import contacts_of
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
 

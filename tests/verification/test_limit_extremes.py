@@ -198,19 +198,3 @@ def test_the_checker_accepts_what_is_certified_on_a_limit(seed: int) -> None:
             interval: Any = SimpleNamespace(controls=columns, degree=1)
             asked: Any = SimpleNamespace(problem=PROBLEM, lengths=[1.0])
             Rows(asked, motion)._limits(interval)
-
-
-@pytest.mark.parametrize("degree", [1, 3])
-def test_ranges_of_many_columns_are_told_as_each_by_itself(degree: int) -> None:
-    rng = np.random.default_rng([degree, 41])
-    for _ in range(30):
-        path = random_motion(rng, degree).path
-        path = replace(path, knots=np.round(path.knots, 2))  # some equal ones
-        ranges = []
-        for column in rng.permutation(path.knots.shape[1])[: rng.integers(0, 6)]:
-            low, high = np.sort(rng.choice([-0.2, -0.1, 0.0, 0.1, 0.2], 2))
-            row = Check(f"column {column}", Verdict.UNDECIDED, 1, np.nan, np.nan, "rad")
-            ranges.append((int(column), (float(low), float(high)), row))
-        found = extremes.range_checks(path, ranges, 1e-9)
-        alone = [extremes.range_check(path, k, ends, 1e-9, r) for k, ends, r in ranges]
-        assert found == alone

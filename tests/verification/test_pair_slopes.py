@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from oracles.shortcuts import start_proof
 from oracles.tree_queries import random_tree, unit
 
 from vdsm_pin.arm.kinematics import joint_centres
@@ -17,7 +18,6 @@ from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.bodies import Pair as BodyPair
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import start_proof
 from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import Pair
 from vdsm_pin.verification.task import arm_assembly

@@ -18,7 +18,6 @@ from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OWN, TIME, UP
 from vdsm_pin.proof.parts import PartPlan
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Proving
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
@@ -67,20 +66,6 @@ class Proof:
     def is_certified(self) -> bool:
         """Whether every pair is; never of no pairs."""
         return bool(self.verdict.size and (self.verdict == CERTIFIED).all())
-
-
-def start_proof(
-    tree: Tree,
-    bodies: Sequence[Body],
-    path: Path,
-    pairs: PairTable,
-    errors: ErrorBox | None = None,
-    budget: Budget | None = None,
-    columns: IntArray | None = None,
-) -> tuple[Proving, PartPlan]:
-    """Everything ready, nothing judged; arguments as for `prove`."""
-    asked = Question.of(tree, bodies, pairs, errors, columns)
-    return asked.about(path, budget), asked.plan
 
 
 def prove(

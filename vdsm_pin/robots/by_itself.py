@@ -15,7 +15,7 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.extremes import largest, range_checks
+from vdsm_pin.verification.extremes import largest, range_check
 from vdsm_pin.verification.records import Check, Verdict
 
 POSES: Final = "link poses by Pinocchio against the tree's"
@@ -49,14 +49,13 @@ def checks_by_itself(robot: Robot, path: Path) -> list[Check]:
 
     Limits have slack for the arithmetic of readers.
     """
-    ranges = []
+    slack, held = TOLERANCES.arithmetic, []
     for k, joint in enumerate(robot.joints):
         ends = joint.lower, joint.upper
         if np.isfinite(ends).all():
             name, n = LIMITS.format(name=joint.name), len(path.knots)
             row = Check(name, Verdict.UNDECIDED, n, nan, nan, joint.unit, joint.whose)
-            ranges.append((k, ends, row))
-    held = range_checks(path, ranges, TOLERANCES.arithmetic)
+            held.append(range_check(path, k, ends, slack, row))
     return [pose_check(robot, path), *held, *rate_checks(robot.joints, path)]
 
 

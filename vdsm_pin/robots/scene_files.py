@@ -40,11 +40,6 @@ class SceneModel(FileModel):
     obstacles: list[MovableModel] = Field(description="Solids to avoid.")
 
 
-def read_scene(path: Path, robot_size: float) -> Scene:
-    """The obstacles alone, see `read_scene_with_files`."""
-    return read_scene_with_files(path, robot_size)[0]
-
-
 def read_scene_with_files(
     path: Path, robot_size: float, links: Collection[str] = ()
 ) -> tuple[Scene, tuple[tuple[str, Path], ...]]:

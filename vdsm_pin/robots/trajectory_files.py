@@ -14,7 +14,7 @@ from vdsm_pin.io.source import check_is_file
 from vdsm_pin.io.tables import listed
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
-from vdsm_pin.robots.model import Robot, RobotJoint, Values
+from vdsm_pin.robots.model import RobotJoint, Values
 from vdsm_pin.robots.trajectory_csv import read_csv
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -136,18 +136,6 @@ def _long_ways(q: FloatArray, joints: Sequence[RobotJoint]) -> Iterator[str]:
                 f"and {row + 1}{first}: judged as it stands, the long way round; "
                 "unwrap it if the robot takes the short way"
             )
-
-
-def read_path(file: File, robot: Robot, topic: str | None = None) -> "Path":
-    """A trajectory as the controller runs it, see `read_motion`.
-
-    Straight lines between waypoints; cubic pieces where velocities and times are stated
-    too, and quintic ones with accelerations.
-
-    Raises:
-        InvalidFile: As `read_motion`, or if times do not rise.
-    """
-    return path_of(file, read_motion(file, robot.joints, topic, robot.values))
 
 
 def path_of(file: File, motion: JointTrajectory) -> "Path":

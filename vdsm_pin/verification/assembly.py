@@ -1,9 +1,8 @@
 """What every motion of a problem is asked: bodies on one tree, held apart in pairs."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import overload
 
 import numpy as np
 
@@ -24,56 +23,6 @@ from vdsm_pin.verification.records import Pair
 
 BASE = 0
 """Number of the joint whose placement is where the base stands."""
-
-
-class NamedPairs(Sequence[Pair]):
-    """The pairs of an assembly, each named where it is asked for.
-
-    Args:
-        asked: The assembly.
-    """
-
-    def __init__(self, asked: "Assembly") -> None:
-        self._asked = asked
-
-    @cached_property
-    def _all(self) -> tuple[Pair, ...]:
-        asked = self._asked
-        sides = asked.table.one, asked.table.other
-        own, others = np.where(asked.outer, sides[::-1], sides)
-        return tuple(map(asked.pair_of, own.tolist(), others.tolist()))
-
-    def __len__(self) -> int:
-        """Their number."""
-        return self._asked.table.size
-
-    @overload
-    def __getitem__(self, number: int) -> Pair: ...
-    @overload
-    def __getitem__(self, number: slice) -> tuple[Pair, ...]: ...
-    def __getitem__(self, number: int | slice) -> Pair | tuple[Pair, ...]:
-        """One of them, or some."""
-        if isinstance(number, slice):
-            return self._all[number]
-        return self._asked.pair(range(len(self))[number])
-
-    def __iter__(self) -> Iterator[Pair]:
-        """All, named once."""
-        return iter(self._all)
-
-    def __eq__(self, other: object) -> bool:
-        """Whether others are the same, one by one."""
-        if not isinstance(other, NamedPairs | tuple):
-            return NotImplemented
-        return self._all == tuple(other)
-
-    def __hash__(self) -> int:
-        """That of a tuple of them."""
-        return hash(self._all)
-
-    def __reduce__(self) -> tuple[type[tuple[Pair, ...]], tuple[tuple[Pair, ...]]]:
-        """To files and other processes they go as a tuple."""
-        return tuple, (self._all,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,9 +108,11 @@ class Assembly:
         return Pair(link, "", self.links[other], name, self.names[other])
 
     @cached_property
-    def pairs(self) -> NamedPairs:
-        """Every pair as the reports name it."""
-        return NamedPairs(self)
+    def pairs(self) -> tuple[Pair, ...]:
+        """Every pair by name, in the order of the table."""
+        sides = self.table.one, self.table.other
+        own, others = np.where(self.outer, sides[::-1], sides)
+        return tuple(map(self.pair_of, own.tolist(), others.tolist()))
 
     def placed(self, number: int, poses: FloatArray) -> tuple[Placed, Placed]:
         """Both bodies of a pair where all frames stand, poses (n_frames, 4, 4); [m]."""

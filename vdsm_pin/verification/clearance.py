@@ -19,7 +19,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.layouts import LOW, SLICES, TALLY
+from vdsm_pin.proof.layouts import LOW, TALLY
 from vdsm_pin.proof.prover import RANK
 from vdsm_pin.proof.proving import Proving, dense_rows, room_for
 from vdsm_pin.proof.results import Dense
@@ -62,7 +62,6 @@ class ClearanceProof:
         weakest: Of each pair the interval of the path with its least lower bound, shape
             (n_pairs,).
         profile: Brackets along the motion.
-        slices: Slices tried beyond one per interval and pair.
         late: Whether the time was over before all was judged.
         sent: Intervals whose brackets the sinks received: all, if there was time.
     """
@@ -72,7 +71,6 @@ class ClearanceProof:
     inner: LeastClearances
     weakest: IntArray
     profile: ClearanceProfile
-    slices: int
     late: bool
     sent: int
 
@@ -206,7 +204,6 @@ def prove_motion(
         inner=least_clearances(asked, told),
         weakest=told.lower_interval,
         profile=profile_of(told.profile, told.stride, motion.knots, n_links),
-        slices=int(proving.results.tally[SLICES]),
         late=not in_time,
         sent=sent,
     )

@@ -167,31 +167,8 @@ def range_check(
     def beyond(q: FloatArray) -> FloatArray:
         return np.stack([low - q[:, column], q[:, column] - high], axis=1)
 
-    return _range_row(largest(pieces_of(path), beyond, slack), ends, slack, row)
-
-
-def range_checks(
-    path: Path, ranges: Sequence[tuple[int, tuple[float, float], Check]], slack: float
-) -> list[Check]:
-    """`range_check` of several columns, ranges and rows; of straight lines at once."""
-    if not ranges or path.degree > 1 or path.n_samples > CHUNK:
-        return [range_check(path, *one[:2], slack, one[2]) for one in ranges]
-    q = path.knots[:, [column for column, _, _ in ranges]].T
-    low, high = np.array([ends for _, ends, _ in ranges]).T[:, :, None]
-    beyond = np.stack([low - q, q - high], axis=2).reshape(len(ranges), -1)
-    found, at = [], np.argmax(beyond, axis=1)
-    most = beyond[np.arange(len(ranges)), at].tolist()
-    for (_, ends, row), k, value in zip(ranges, at.tolist(), most, strict=True):
-        largest_one = Largest(value, float(k // 2), k % 2, value)
-        found.append(_range_row(largest_one, ends, slack, row))
-    return found
-
-
-def _range_row(
-    found: Largest, ends: tuple[float, float], slack: float, row: Check
-) -> Check:
-    """The row of what comes nearest to an end of a range."""
-    (low, high), worst = ends, found.worst(slack)
+    found = largest(pieces_of(path), beyond, slack)
+    worst = found.worst(slack)
     return replace(
         row,
         verdict=found.verdict(slack),

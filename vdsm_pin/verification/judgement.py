@@ -16,14 +16,13 @@ from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
 from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.clearance_check import Evidence, clearance_checks
-from vdsm_pin.verification.contact_search import contacts_of
 from vdsm_pin.verification.enclosed import (
     enclosed_checks,
     enclosed_least,
     enclosed_profile,
     pairs_inside,
 )
-from vdsm_pin.verification.first_contact import FirstContact
+from vdsm_pin.verification.first_contact import FirstContact, contacts_of
 from vdsm_pin.verification.inside import Places, check_inside, is_outside, located
 from vdsm_pin.verification.protocols import AnyMotion
 from vdsm_pin.verification.records import (

@@ -1,0 +1,42 @@
+"""What many tests ask of the package in one step, and no command does."""
+
+from collections.abc import Sequence
+from pathlib import Path as File
+
+from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.parts import PartPlan
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.proving import Proving
+from vdsm_pin.proof.question import Question
+from vdsm_pin.proof.tree import Tree
+from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.scene_files import read_scene_with_files
+from vdsm_pin.robots.trajectory_files import path_of, read_motion
+
+
+def start_proof(
+    tree: Tree,
+    bodies: Sequence[Body],
+    path: Path,
+    pairs: PairTable,
+    errors: ErrorBox | None = None,
+    budget: Budget | None = None,
+    columns: IntArray | None = None,
+) -> tuple[Proving, PartPlan]:
+    """Everything ready, nothing judged; arguments as for `prove`."""
+    asked = Question.of(tree, bodies, pairs, errors, columns)
+    return asked.about(path, budget), asked.plan
+
+
+def read_scene(path: File, robot_size: float) -> Scene:
+    """The obstacles of a file alone."""
+    return read_scene_with_files(path, robot_size)[0]
+
+
+def read_path(file: File, robot: Robot, topic: str | None = None) -> Path:
+    """A trajectory as the controller of a robot runs it."""
+    return path_of(file, read_motion(file, robot.joints, topic, robot.values))
