@@ -144,7 +144,7 @@ def test_the_tip_finds_its_way_through_a_slot_hardly_wider_than_the_body(
     ]
     goal = R @ [1.75, 0.1, 0.0]
     task = problem(*plates, *posts, points=np.stack([goal, goal]), start=START)
-    _, route = space_of(task)._begun(goal)
+    _, route = space_of(task)._begun(goal, 60_000)
     assert route is not None
     places = resampled(route, 0.002) @ R
     within = (places[:, 0] > 0.2) & (places[:, 0] < 2.6)
@@ -305,8 +305,7 @@ def test_a_way_from_afar_does_not_cut_the_corners_of_its_cells() -> None:
     bends = Bend(0.2, 0.6, 0.7, 0.3), Bend(0.1, 0.6, 0.7, 2.8)
     task = bent_tube(-9.0, 0.004, *bends)
     space, ends = space_of(task), np.stack([task.path.start, task.path.points[0]])
-    space.most = 300_000
-    points = space._cells(ends).cheapest(*ends)
+    points = space._cells(ends).cheapest(*ends, 300_000)
     assert points is not None
     lines = np.stack([points[:-1], points[1:]], axis=1)
     assert link_clearance(task)(lines).min() >= space.room.required

@@ -22,7 +22,7 @@ from vdsm_pin.planner.fewest.levels import Effort, Insert, Search
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
-from vdsm_pin.planner.impossible.cut_off import FEW_CELLS, MOST_CELLS, cut_off
+from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.impossible.octree import DEPTH, adjoining, places
 from vdsm_pin.planner.upper_clearance import (
     nearest_bounds,
@@ -116,19 +116,19 @@ def test_the_tip_of_a_plan_is_never_cut_off() -> None:
         assert not cut_off(task, tips).any()
 
 
-def test_no_long_proof_is_tried_where_a_way_of_the_tip_is_known(
+def test_no_proof_is_tried_where_a_way_of_the_tip_is_known(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked, both = list[object](), [FEW_CELLS, MOST_CELLS]
+    asked = list[object]()
 
     def counted(*given: object) -> NDArray[np.bool_]:
-        asked.append(given[-1])
+        asked.append(given)
         return np.zeros(len(path_rows(task.path).tips), dtype=np.bool_)
 
     monkeypatch.setattr("vdsm_pin.planner.fewest.explore.cut_off", counted)
     centre = np.array([2.6, 0.5, 0.0])
     tips = centre + np.array([[0.2, 0.0, 0.0], [0.2, 0.1, 0.0]])
-    for window, tries in ((KEEP + 0.02, [FEW_CELLS]), (KEEP - 0.02, both)):
+    for window, tries in ((KEEP + 0.02, 0), (KEEP - 0.02, 1)):
         task = problem(
             *cage(window, np.eye(3), centre), points=tips, closed=False,
             start=(1.8, 0.0, 0.0),
@@ -140,7 +140,7 @@ def test_no_long_proof_is_tried_where_a_way_of_the_tip_is_known(
         found = explore(task, quick, 0.0, CostWeights(), effort)
         # What is known before any search, after the first, and what is proved.
         assert len(list(itertools.islice(found, 3))) == 3
-        assert asked == tries
+        assert len(asked) == tries
         asked.clear()
 
 
@@ -154,7 +154,7 @@ def test_behind_a_wall_between_two_rows_the_path_does_not_lead(wall: float) -> N
 
     asked: list[float] = []
 
-    def leads_to(tip: FloatArray) -> bool:
+    def leads_to(tip: FloatArray, _: int) -> bool:
         asked.append(tip[0])
         return bool(tip[0] < wall)
 

@@ -34,7 +34,7 @@ from vdsm_pin.planner.fewest.start_node import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips
-from vdsm_pin.planner.impossible.cut_off import FEW_CELLS, MOST_CELLS, cut_off
+from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.impossible.last_link import hemmed_in
 from vdsm_pin.planner.upper_clearance import TIP_ONLY, held_from, last_link
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -48,6 +48,9 @@ STEP: Final = 0.08
 """Lattice step of the directions of shapes; [-]."""
 PLACES: Final = 8
 """Largest number of joints at which a knee is tried."""
+
+FEW_CELLS: Final = 16_000
+"""Cells at which a first look for ways of the tip ends, a tenth or two of a second."""
 
 ROOMY: Final = 0.96
 """Part of the tips at which some arm stands where nothing confines it; [-]."""
@@ -217,7 +220,7 @@ def _leads_there(space: TipSpace, outcome: Outcome) -> bool:
     room = space.room._replace(required=outcome.judge.problem.required_clearance)
     led = open_[:-1] & (room.spare(tips[:-1], tips[1:]) >= 0.0)
     first = open_ & ~outcome.drawn & ~np.append(False, led)
-    return all(space.leads_to(tip) for tip in tips[first])
+    return all(space.leads_to(tip, FEW_CELLS) for tip in tips[first])
 
 
 def _inserted(
@@ -271,18 +274,13 @@ def _cut_off(
 ) -> Outcome:
     """The outcome with rows that no way of the tip is proved to lead to.
 
-    A long look is worth it only where no way of the tip is known.
+    Where ways of the tip to all of them are soon found, there are none.
     """
+    if space and _leads_there(space, outcome):
+        return outcome
     there, tips = held_from(problem, TIP_ONLY), outcome.rows.tips
-
-    def looked(most: int) -> Outcome:
-        found = cut_off(there, tips, clearance.deadline, most)
-        return replace(outcome, proof=replace(outcome.proof, cut_off=found))
-
-    first = looked(FEW_CELLS)
-    if first.proof.closed.all() or (space and _leads_there(space, first)):
-        return first
-    return looked(MOST_CELLS)
+    found = cut_off(there, tips, clearance.deadline)
+    return replace(outcome, proof=replace(outcome.proof, cut_off=found))
 
 
 def _hemmed_in(

@@ -127,8 +127,13 @@ class TipCells(Octree):
         place = (points - self.corner) / self.side * 2.0**DEPTH
         return holders(self.codes, np.clip(place, 0, 2**DEPTH - 1).astype(np.int64))
 
-    def cheapest(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
-        """Points on the cheapest way that is clear, shape (k, 3); None without one."""
+    def cheapest(
+        self, start: FloatArray, goal: FloatArray, most: int
+    ) -> FloatArray | None:
+        """Points on the cheapest way that is clear, shape (k, 3).
+
+        None if there is none, or none is found with so many cells.
+        """
         while True:
             cost, doubt = self.costs()
             ends = self.holders(np.stack([start, goal]))
@@ -142,7 +147,7 @@ class TipCells(Octree):
                 return None
             back = doubt_to(ends[1:], first, neighbours, cost)
             # The more cells there are, the more are halved at once.
-            detour = DETOUR * (1.0 + MORE * self.codes.size / self.most)
+            detour = DETOUR * (1.0 + MORE * self.codes.size / most)
             detour *= min(best, self.longest)
             halved = doubt & (there + back <= best + detour + cost)
             route = self._traced(int(ends[1]), int(ends[0]), there, first, neighbours)
@@ -152,7 +157,7 @@ class TipCells(Octree):
                 halved = self._blocked(route, cells, points)
                 if not halved.any():
                     return points
-            if self.codes.size > self.most:
+            if self.codes.size > most:
                 return None
             self.split(np.flatnonzero(halved))
 

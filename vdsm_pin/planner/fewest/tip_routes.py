@@ -102,18 +102,24 @@ class TipSpace:
                 return
             yield known[number]
 
-    def leads_to(self, goal: FloatArray) -> bool:
-        """Whether there is a way of the tip to a goal, shape (3,)."""
-        return not (self.start != goal).any() or self._begun(goal)[1] is not None
+    def leads_to(self, goal: FloatArray, most: int) -> bool:
+        """Whether so many cells are enough for a clear way to a goal, shape (3,)."""
+        if not (self.start != goal).any():
+            return True
+        way = self._begun(goal, min(most, self.most))[1]
+        return way is not None and bool((self.room.spare(way[:-1], way[1:]) >= 0).all())
 
-    def _begun(self, goal: FloatArray) -> tuple[TipCells, FloatArray | None]:
+    def _begun(self, goal: FloatArray, most: int) -> tuple[TipCells, FloatArray | None]:
         """Cells halved so far that a way to a goal is known, if any, and that way."""
         key = goal.tobytes()
         if key not in self.begun:
-            cells = self._cells(np.stack([self.start, goal]))
+            self.begun[key] = self._cells(np.stack([self.start, goal])), None
+        cells, route = self.begun[key]
+        if route is None and cells.codes.size <= most:
             cells.avoided = self.stuck
-            self.begun[key] = cells, cells.cheapest(self.start, goal)
-        return self.begun[key]
+            route = cells.cheapest(self.start, goal, most)
+            self.begun[key] = cells, route
+        return cells, route
 
     def _search(self, goal: FloatArray) -> Iterator[FloatArray]:
         """Ways to a goal without end, as long as there are any."""
@@ -122,7 +128,7 @@ class TipSpace:
             yield start[None]
             return
         narrow = list[FloatArray]()
-        cells, route = self._begun(goal)
+        cells, route = self._begun(goal, self.most)
         while route is not None:
             short = resampled(shortened(self.room, route), self.spacing)
             for effort in QUICK, THOROUGH:
@@ -134,7 +140,7 @@ class TipSpace:
                     break
             narrow.append(self.room.narrowest(route))
             cells.avoided = [*narrow, *self.stuck]
-            route = cells.cheapest(start, goal)
+            route = cells.cheapest(start, goal, self.most)
 
     def avoid(self, place: FloatArray) -> None:
         """Have ways that are looked for from now on avoid a place, shape (3,); [m]."""

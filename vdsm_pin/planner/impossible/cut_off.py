@@ -32,8 +32,6 @@ from vdsm_pin.tolerances import TOLERANCES
 
 MOST_CELLS: Final = 60_000
 """Cells at which a search ends; it has taken a second or two by then."""
-FEW_CELLS: Final = 16_000
-"""Cells at which a first look ends, a tenth or two of a second."""
 LIGHT: Final = 0.02
 """Doubt of a cell whose centre is clear over that of another; [-]."""
 LIKELY: Final = 0.5
@@ -141,7 +139,6 @@ def cut_off(
     problem: PlanningProblem,
     tips: FloatArray,
     deadline: Deadline = NO_LIMIT,
-    most_cells: int = MOST_CELLS,
 ) -> BoolArray:
     """Which tips no way leads to from the start; proved, but not every such tip found.
 
@@ -151,7 +148,6 @@ def cut_off(
         problem: Arm, scene, start, required clearance.
         tips: Shape (n, 3); [m].
         deadline: When to give up.
-        most_cells: Cells at which the search ends.
 
     Returns:
         Shape (n,).
@@ -171,7 +167,7 @@ def cut_off(
         need = np.where(goals >= 0, there[goals], 0.0)
         closed = ~np.isfinite(need)
         open_ = np.unique(goals[(need > 0.0) & ~closed])
-        if not open_.size or cells.codes.size > most_cells:
+        if not open_.size or cells.codes.size > MOST_CELLS:
             return np.asarray(closed)
         through = there + doubt_to(open_, first, neighbours, doubt) - doubt
         good = (cells.state == DOUBTFUL) & (cells.levels < DEPTH)
