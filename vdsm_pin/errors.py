@@ -62,8 +62,8 @@ class InvalidFile(InvalidInput):
         problem: What is wrong and what was expected.
 
     Attributes:
-        others: What else is wrong in the file, in its order; the message tells how
-            many there are.
+        others: What else is wrong in the file; as text the error tells how many
+            there are.
     """
 
     def __init__(self, *, file: object, where: str = "", problem: str) -> None:
@@ -71,6 +71,11 @@ class InvalidFile(InvalidInput):
         self.others: tuple[InvalidFile, ...] = ()
         place = f"{file}: {where}" if where else str(file)
         super().__init__(f"{place}: {problem}")
+
+    def __str__(self) -> str:
+        """The message, and how many more there are."""
+        more = f" (and {len(self.others)} more)" if self.others else ""
+        return super().__str__() + more
 
 
 class CannotWrite(InvalidFile):

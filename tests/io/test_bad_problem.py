@@ -1,6 +1,8 @@
 """Bad problem files: one sentence with file, field, line, value and expectation."""
 
 import os
+import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import problem_file, source, yaml_reader
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.robots.cell import read_cell
 
 OBS1 = built_in_text("paper/obs1")
 PILLAR = {
@@ -553,6 +556,108 @@ def test_a_command_tells_every_error_of_a_file(
     points = [f"tip_path.points[{k}]" for k in range(30)]
     others = {"length_unit", "obstacles[0].radius", "required_clearance"}
     assert sorted(places) == sorted([*points, *others])
+
+
+WITHOUT_A_SHAPE = """\
+vdsm_problem: 1
+length_unit: mm
+manipulator: hrm8
+obstacles:
+  - {name: =a, shape: tube, axis: w, center: [1, 2], radius: -1, colour: red, size: 1,
+     motion: {times_s: []}}
+  - {name: b, normal: [1, 0, 0], solid: maybe, scale: 0}
+  - {shape: tube, radius: 2}
+required_clearance: 5
+"""
+
+NO_SENSE = """\
+vdsm_problem: 1
+length_unit: mm
+manipulator: {link_lengths: [400, 400, 400], link_radius: [50, 50],
+  max_link_angle_deg: 40, max_joint_angle_deg: 40, base_range: [2, 1],
+  cables: {hole_radius: 90, half_gap: 20}}
+obstacles:
+  - {name: a, shape: cylinder, axis: [0, 0, 0], center: [0, 0, 0], radius: 1, length: 2}
+  - {name: a, shape: box, center: [0, 0, 0], size: [1, 1, 1]}
+  - {name: link 3, shape: mesh, file: none.stl}
+others:
+  - {name: left, manipulator: hrm8, trajectory: none.csv}
+  - {name: right, trajectory: none.csv}
+tip_path: {start: [1200, 0, 0], points: [[1200, 0, 0]]}
+goal: {tip: [1, 2, 3]}
+tip_tolerance: 50
+required_clearance: 5
+"""
+
+OF_THE_ARM = """\
+vdsm_problem: 1
+length_unit: mm
+manipulator: hrm8
+obstacles:
+  - {name: floor, shape: half_space, point: [0, 0, -900], normal: [0, 0, 1]}
+tip_path:
+  start: [9000, 0, 0]
+  points: [{arc: {through: [1, 2, 3], to: [1, 2, 4]}}]
+  insertion: [[1.0e+9, 0, 0]]
+ratios: {cylinder_radius: 3, joint: 2}
+errors:
+  joint_deg: [1, 2]
+  obstacles: [{name: none, shift: 1}, {name: floor, turn_deg: 1}]
+required_clearance: 5
+"""
+
+OF_A_ROBOT = """\
+vdsm_problem: 1
+length_unit: m
+robot: {urdf: none.urdf}
+obstacles:
+  - {name: a, shape: mesh, file: none.stl}
+  - {name: a, shape: sphere, center: [0, 0, 0], radius: 1}
+others:
+  - {name: left, robot: {urdf: none.urdf}, trajectory: none.csv}
+required_clearance: 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "read", "places"),
+    [
+        (
+            WITHOUT_A_SHAPE,
+            read_problem,
+            "0.name 0.shape 0.axis 0.center 0.radius 0.colour 0.motion.times_s 0.size "
+            "1.shape 1.solid 1.scale 2.shape 2.name",
+        ),
+        (
+            NO_SENSE,
+            read_problem,
+            "manipulator.link_radius manipulator.base_range "
+            "manipulator.cables.hole_radius 0.axis 1.name 2.name 2.file "
+            "others[0].trajectory others[1].trajectory goal tip_tolerance",
+        ),
+        (
+            OF_THE_ARM,
+            read_problem,
+            "tip_path.start tip_path.points[0] tip_path.insertion[0] ratios "
+            "errors.joint_deg errors.obstacles[0].name errors.obstacles[1].turn_deg",
+        ),
+        (OF_A_ROBOT, read_cell, "none.urdf 0.file 1.name others[0].trajectory"),
+    ],
+)
+def test_what_makes_no_sense_is_told_whole(
+    tmp_path: Path, text: str, read: Callable[[Path], object], places: str
+) -> None:
+    """A shape that nobody knows, or a part that fails, hides nothing else."""
+    path = tmp_path / "wrong.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InvalidFile) as refused:
+        read(path)
+    errors = refused.value, *refused.value.others
+    found = [one.where.split(" (")[0] or Path(one.file).name for one in errors]
+    expected = [re.sub(r"^(\d)", r"obstacles[\1]", place) for place in places.split()]
+    assert sorted(found) == sorted(expected)
+    assert str(refused.value).endswith(f"(and {len(expected) - 1} more)")
+    assert not any(one.others for one in refused.value.others)
 
 
 def test_lines_are_those_of_the_file_not_of_the_data(tmp_path: Path) -> None:

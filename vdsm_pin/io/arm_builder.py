@@ -1,6 +1,7 @@
 """The arm of a problem file to a `Manipulator`, in metres and radians."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, TypeAlias, cast
 
 import numpy as np
@@ -12,6 +13,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import arm_schema as schema
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
+from vdsm_pin.io.problem_errors import Gathered
 from vdsm_pin.io.reading import Reading
 from vdsm_pin.io.urdf_arm import read_urdf_arm
 from vdsm_pin.io.yaml_reader import Location
@@ -54,22 +56,20 @@ class ArmBuilder(Reading):
             return built_in(model)
         if isinstance(model, schema.UrdfManipulatorModel):
             return self._from_urdf(model)
-        lengths, radii = self.frame.metres(model.link_lengths), self._radii(model)
+        each, lengths = Gathered(), self.frame.metres(model.link_lengths)
+        radii = each.get(lambda: self._radii(model))
         tool = None
         if model.tool:
             size = model.tool.length, model.tool.radius
             tool = Tool(*(float(x) for x in self.frame.metres(size)))
             lengths[-1] += tool.length
-        bodies = self._bodies(model, float(lengths.sum()))
-        stroke = DEFAULT_STROKE * float(lengths.sum())
-        low, high = -stroke, stroke
-        if model.base_range is not None:
-            low, high = (float(x) for x in self.frame.metres(model.base_range))
-            if not low <= high:
-                problem = f"is {model.base_range}, expected the smaller value first"
-                raise self.invalid((*self.at, "base_range"), problem)
-        self._check_extent(float(lengths.sum()), max(-low, high))
+        bodies = each.get(lambda: self._bodies(model, float(lengths.sum())))
+        rail = each.get(lambda: self._rail(model, float(lengths.sum())))
         thinnest = float(np.min(model.link_radius))
+        read = partial(self._cables, model.cables, model.link_lengths, thinnest)
+        cables = each.get(read)
+        each.end()
+        assert radii is not None and bodies is not None and rail and cables  # else told
         with self.document.naming(self.at):
             return Manipulator(
                 model.name,
@@ -77,14 +77,27 @@ class ArmBuilder(Reading):
                 float(radii.max()),
                 float(radians(model.max_link_angle_deg)),
                 float(radians(model.max_joint_angle_deg)),
-                (low, high),
-                self._cables(model.cables, model.link_lengths, thinnest),
+                rail,
+                cables,
                 radii=radii if isinstance(model.link_radius, list) else None,
                 tool=tool,
                 feed=self._feed(model, float(radii[0])),
                 bodies=bodies,
                 ignore_pairs=tuple((a, b) for a, b in model.ignore_pairs),
             )
+
+    def _rail(
+        self, model: schema.ManipulatorModel, length: float
+    ) -> tuple[float, float]:
+        """Where the base may stand; twice the arm's length either way if not stated."""
+        low, high = -DEFAULT_STROKE * length, DEFAULT_STROKE * length
+        if model.base_range is not None:
+            low, high = (float(x) for x in self.frame.metres(model.base_range))
+            if not low <= high:
+                problem = f"is {model.base_range}, expected the smaller value first"
+                raise self.invalid((*self.at, "base_range"), problem)
+        self._check_extent(length, max(-low, high))
+        return low, high
 
     def _radii(self, model: schema.ManipulatorModel) -> FloatArray:
         """Radius of every link; [m]."""

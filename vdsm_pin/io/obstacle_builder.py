@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import singledispatchmethod
+from functools import partial, singledispatchmethod
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -19,6 +19,7 @@ from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.mesh_size import MeshSize
 from vdsm_pin.io.motion_field import FLOATING, MotionModel, MovableModel
+from vdsm_pin.io.problem_errors import Gathered
 from vdsm_pin.io.reading import Reading
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location
@@ -45,31 +46,37 @@ class ObstacleBuilder(Reading):
     """Converts the obstacles of one file.
 
     Args:
-        arm_length: For judging the size of a mesh; [m].
+        arm_length: For judging the size of a mesh; None where nobody knows; [m].
         origin: What the frame's origin is called.
     """
 
-    arm_length: float
+    arm_length: float | None
     origin: str = "the base"
 
     def build_scene(
-        self, models: Sequence[MovableModel], arm: Manipulator
+        self, models: Sequence[MovableModel], arm: Manipulator | None
     ) -> scene.Scene:
         """All obstacles, in file order.
 
         Args:
             models: Of the file.
-            arm: Whose bodies have names too.
+            arm: Whose bodies have names too; None where nobody knows.
 
         Raises:
             InvalidFile: If one is not a solid, has a body's name, or two share one.
         """
-        obstacles = self.build_all(models, ("obstacles",))
-        for i, model in enumerate(models):
-            if arm.owner_of(model.name) in arm.body_names:
+
+        def check(model: MovableModel, at: Location) -> None:
+            if arm is not None and arm.owner_of(model.name) in arm.body_names:
                 problem = f"is {model.name!r}, which a body of the arm is called"
-                raise self.invalid(("obstacles", i, "name"), problem)
-        return scene.Scene(obstacles)
+                raise self.invalid((*at, "name"), problem)
+
+        each, at = Gathered(), ("obstacles",)
+        obstacles = each.get(lambda: self.build_all(models, at))
+        for i, model in enumerate(models):
+            each.get(partial(check, model, (*at, i)))
+        each.end()
+        return scene.Scene(obstacles or ())
 
     def build_all(
         self, models: Sequence[Any], at: Location
@@ -84,19 +91,24 @@ class ObstacleBuilder(Reading):
             InvalidFile: If one is not a solid, has a link's name, or two share one.
         """
         first: dict[str, int] = {}
+        each = Gathered()
+        found = []
         for i, model in enumerate(models):
-            if _LINK_NAME.fullmatch(model.name):
-                problem = f"is {model.name!r}, which is how links of the arm are named"
-                raise self.invalid((*at, i, "name"), problem)
-            if model.name in first:
-                problem = (
-                    f"is {model.name!r}, which {at[-1]}[{first[model.name]}] is "
-                    "called already; names are unique"
-                )
-                raise self.invalid((*at, i, "name"), problem)
-            first[model.name] = i
-        solids = (self._checked(model, (*at, i)) for i, model in enumerate(models))
-        return tuple(solids)
+            same = first.setdefault(model.name, i)
+            each.get(partial(self._check_name, model.name, (*at, i), same))
+            found.append(each.get(partial(self._checked, model, (*at, i))))
+        each.end()
+        return tuple(one for one in found if one is not None)
+
+    def _check_name(self, name: str, at: Location, first: int) -> None:
+        """Refuse the name of a link, and one that an entry before it has."""
+        *_, where, i = at
+        if _LINK_NAME.fullmatch(name):
+            problem = f"is {name!r}, which is how links of the arm are named"
+            raise self.invalid((*at, "name"), problem)
+        if first != i:
+            problem = f"is {name!r}, which {where}[{first}] is called already"
+            raise self.invalid((*at, "name"), f"{problem}; names are unique")
 
     def _checked(self, model: Any, at: Location) -> scene.Obstacle:
         motion: MotionModel | None = getattr(model, "motion", None)
@@ -274,7 +286,7 @@ class ObstacleBuilder(Reading):
     def _placed(self, points: FloatArray, size: MeshSize, at: Location) -> FloatArray:
         """Points of a file in the base frame, of a size that is no slip; [m]."""
         model = size.model
-        if model.check_size:
+        if model.check_size and self.arm_length is not None:
             size.check(self.arm_length, self.document, at)
         return self.frame.placed(points, size.scale, model.rpy_deg, model.center)
 

@@ -6,6 +6,7 @@ each their own.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -21,6 +22,7 @@ from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.arm_schema import ManipulatorModel, UrdfManipulatorModel
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_schema import FromFileModel
+from vdsm_pin.io.problem_errors import Gathered
 from vdsm_pin.io.problem_schema import OtherModel
 from vdsm_pin.io.robot_schema import RobotModel
 from vdsm_pin.io.source import check_is_file_or_bag, read_bytes
@@ -104,14 +106,22 @@ class OtherReader:
         """
         bodies, files = list[Moving](), list[Path]()
         contents: dict[Path, bytes] = {}
+        each = Gathered()
         for i, model in enumerate(models):
-            found = self._one(model, ("others", i))
-            if not found.timed:
-                problem = f"{model.trajectory!r} has no times, which it needs: time_s"
-                raise self.document.invalid(("others", i, "trajectory"), problem)
+            found = each.get(partial(self._timed, model, ("others", i)))
+            if found is None:
+                continue
             bodies, files = [*bodies, *found.bodies], [*files, *found.files]
             contents |= found.contents
+        each.end()
         return Others(tuple(bodies), tuple(files), contents=contents)
+
+    def _timed(self, model: OtherModel, at: Location) -> Others:
+        found = self._one(model, at)
+        if not found.timed:
+            problem = f"{model.trajectory!r} has no times, which it needs: time_s"
+            raise self.document.invalid((*at, "trajectory"), problem)
+        return found
 
     def _one(self, model: OtherModel, at: Location) -> Others:
         where, file, pose = (*at, "trajectory"), self.folder / model.trajectory, eye(4)

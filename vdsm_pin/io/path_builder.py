@@ -1,6 +1,7 @@
 """The tip path of a problem file to a `DesiredPath` in the base frame."""
 
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Final
@@ -21,6 +22,7 @@ from vdsm_pin.io.path_schema import (
     TipPathModel,
 )
 from vdsm_pin.io.posture_field import PostureBuilder
+from vdsm_pin.io.problem_errors import Gathered
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.tables import Table, as_text
 from vdsm_pin.problem.desired_path import Approach, Blocked, DesiredPath, Order
@@ -74,12 +76,15 @@ class PathBuilder(PostureBuilder):
             InvalidFile: If the arm cannot stand at the start, the path leaves the
                 extent for which distances are proved, or would need too many rows.
         """
-        start = self.start(model.start, ("tip_path", "start"))
-        corners, parts = self._corners(model)
-        points = self.frame.point(corners)
-        insertion = self.frame.point(np.array(model.insertion).reshape(-1, 3))
-        self._check_points(points, "points", parts)
-        self._check_points(insertion, "insertion", np.arange(len(insertion)))
+        each = Gathered()
+        start = each.get(lambda: self.start(model.start, ("tip_path", "start")))
+        insertion = each.get(lambda: self._insertion(model))
+        points = each.get(lambda: self._points(model))
+        pointing = None
+        if points is not None:
+            pointing = each.get(partial(self._pointing, model, points))
+        each.end()
+        assert start and points is not None and insertion is not None  # else told
         home = model.retreat == "home"
         path = DesiredPath(
             start.tip,
@@ -92,12 +97,25 @@ class PathBuilder(PostureBuilder):
             model.required_coverage,
             start.joints,
             Order(model.order),
-            self._pointing(model, points),
+            pointing,
             home,
             insertion,
         )
         self._check_rows(path)
         return path
+
+    def _points(self, model: TipPathModel) -> FloatArray:
+        """All corners in the base frame, shape (n, 3); [m]."""
+        corners, parts = self._corners(model)
+        points = self.frame.point(corners)
+        self._check_points(points, "points", parts)
+        return points
+
+    def _insertion(self, model: TipPathModel) -> FloatArray:
+        """Places on the way to the path, in the base frame, shape (n, 3); [m]."""
+        places = self.frame.point(np.array(model.insertion).reshape(-1, 3))
+        self._check_points(places, "insertion", np.arange(len(places)))
+        return places
 
     def _pointing(self, model: TipPathModel, points: FloatArray) -> Pointing | None:
         """Where the last link looks, in the base frame.

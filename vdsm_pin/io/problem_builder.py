@@ -1,7 +1,9 @@
 """A checked problem file to a planning problem: units, frames, defaults, and sense."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import MAX_BYTES, Others
 from vdsm_pin.io.path_builder import PathBuilder, spacing_of
+from vdsm_pin.io.problem_errors import Gathered
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -56,35 +59,68 @@ def build_problem(
         InvalidFile: If values that are each in range make no sense together.
     """
     frame = model.frame
-    known = document, frame, folder, digest
-    arm = ArmBuilder(*known).build(model.manipulator)
+    known, each = (document, frame, folder, digest), Gathered()
     self_clearance = float(frame.metres(model.required_self_clearance))
-    _check_links_apart(arm, self_clearance, frame, document)
-    obstacles = ObstacleBuilder(*known, arm.total_length)
-    scene = obstacles.build_scene(model.obstacles, arm)
-    others = read_others(frame)
-    for file in others.files:
-        read = others.contents.get(file)
-        digest.update(read_bytes(file, limit=MAX_BYTES) if read is None else read)
-    scene = joined(scene, others.bodies, document)
-    _check_ignored(arm, scene.names, document)
-    _check_ends(model, document)
-    paths = PathBuilder(*known, arm)
+
+    def read_arm() -> Manipulator:
+        arm = ArmBuilder(*known).build(model.manipulator)
+        _check_links_apart(arm, self_clearance, frame, document)
+        return arm
+
+    arm = each.get(read_arm)
+    obstacles = ObstacleBuilder(*known, arm.total_length if arm else None)
+    rest = each.get(lambda: obstacles.build_scene(model.obstacles, arm))
+    others = each.get(lambda: read_others(frame))
+    scene = None
+    if rest is not None and others is not None:
+        for file in others.files:
+            read = others.contents.get(file)
+            digest.update(read_bytes(file, limit=MAX_BYTES) if read is None else read)
+        scene = each.get(partial(joined, rest, others.bodies, document))
+    each.get(lambda: _check_ends(model, document))
+    tip_tolerance = each.get(lambda: _tip_tolerance(model, frame, document))
+    if arm and scene:
+        each.get(partial(_check_ignored, arm, scene.names, document))
+    asked = _asked_of(arm, model, known, each)
+    errors = each.get(lambda: _errors(model.errors, frame, (arm, scene), document))
+    each.end()
+    assert arm and scene and errors and tip_tolerance  # else what is wrong was told
     return PlanningProblem(
         name=model.name or name,
         manipulator=arm,
         scene=scene,
-        tip_path=paths.build(model.tip_path) if model.tip_path else None,
         required_clearance=float(frame.metres(model.required_clearance)),
         T_world_base=frame.pose,
         required_self_clearance=self_clearance,
-        tip_tolerance=_tip_tolerance(model, frame, document),
+        tip_tolerance=tip_tolerance,
         max_row_change=_row_change(model),
-        start=paths.start(model.start, ("start",)) if model.start else None,
-        goal=paths.goal(model.goal, ("goal",)) if model.goal else None,
-        errors=_errors(model.errors, frame, (arm.n_links, scene), document),
-        scaling=_scaling(model.ratios, arm, frame, document),
+        errors=errors,
+        **asked,
     )
+
+
+def _asked_of(
+    arm: Manipulator | None,
+    model: schema.ProblemModel,
+    known: tuple[YamlDocument, Frame, Path, Digest],
+    each: Gathered,
+) -> dict[str, Any]:
+    """What an arm shall do: path, start, goal and scaling, as far as they are given."""
+    if arm is None:
+        return {}
+    paths = PathBuilder(*known, arm)
+    start, goal = partial(paths.start, at=("start",)), partial(paths.goal, at=("goal",))
+    scaling = partial(_scaling, arm=arm, document=known[0], frame=known[1])
+    reads: dict[str, tuple[Callable[[Any], Any], Any]] = {
+        "tip_path": (paths.build, model.tip_path),
+        "start": (start, model.start),
+        "goal": (goal, model.goal),
+        "scaling": (scaling, model.ratios),
+    }
+    return {
+        name: None if given is None else each.get(partial(read, given))
+        for name, (read, given) in reads.items()
+    }
 
 
 def joined(
@@ -100,29 +136,30 @@ def joined(
 
 
 def _errors(
-    model: ErrorsModel, frame: Frame, known: tuple[int, Scene], document: YamlDocument
-) -> ErrorBox:
-    """The errors under which every clearance is asked for."""
-    n_links, scene = known
-    joint = model.joint_deg
-    if isinstance(joint, list) and len(joint) != n_links:
-        problem = f"has {len(joint)} values, expected {n_links}: one per joint"
-        raise document.invalid(("errors", "joint_deg"), problem)
-    errors = model.box(frame.unit, scene, document)
-    with document.naming(("errors",)):
-        errors.angles(n_links)
+    model: ErrorsModel,
+    frame: Frame,
+    known: tuple[Manipulator | None, Scene | None],
+    document: YamlDocument,
+) -> ErrorBox | None:
+    """The errors under which every clearance is asked for; None where nobody knows."""
+    (arm, scene), joint, each = known, model.joint_deg, Gathered()
+    if arm and isinstance(joint, list) and len(joint) != arm.n_links:
+        problem = f"has {len(joint)} values, expected {arm.n_links}: one per joint"
+        each.note(document.invalid(("errors", "joint_deg"), problem))
+    errors = None
+    if scene is not None:
+        errors = each.get(partial(model.box, frame.unit, scene, document))
+    each.end()
+    if arm and errors:
+        with document.naming(("errors",)):
+            errors.angles(arm.n_links)
     return errors
 
 
 def _scaling(
-    model: schema.RatiosModel | None,
-    arm: Manipulator,
-    frame: Frame,
-    document: YamlDocument,
-) -> Scaling | None:
+    model: schema.RatiosModel, arm: Manipulator, frame: Frame, document: YamlDocument
+) -> Scaling:
     """What takes the place of constant ratios about the rail."""
-    if model is None:
-        return None
     given = (model.values, model.scaling_centre, model.cylinder_radius)
     if sum(one is not None for one in given) != 1:
         problem = "expected one of values, scaling_centre and cylinder_radius"

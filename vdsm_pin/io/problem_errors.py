@@ -1,6 +1,6 @@
 """Pydantic's complaints in this package's words: field, line, value, expectation."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final, TypeVar, get_args
 
 from pydantic import Tag, ValidationError
@@ -47,6 +47,44 @@ _WORDS: Final = {
 
 
 Model = TypeVar("Model", bound=FileModel)
+T = TypeVar("T")
+
+
+class Gathered:
+    """What is wrong in the parts of one file, which are read one by one."""
+
+    def __init__(self) -> None:
+        self._found: list[InvalidFile] = []
+
+    def get(self, read: Callable[[], T]) -> T | None:
+        """A part, or None where it is invalid, which is noted."""
+        try:
+            return read()
+        except InvalidFile as error:
+            self.note(error)
+        return None
+
+    def note(self, error: InvalidFile) -> None:
+        """Tell an error, and those that it carries, at the end."""
+        self._found += [error, *error.others]
+
+    def end(self) -> None:
+        """Tell all that was noted, if anything.
+
+        Raises:
+            InvalidFile: The first of them, which carries the others.
+        """
+        if self._found:
+            raise together(self._found)
+
+
+def together(errors: Sequence[InvalidFile]) -> InvalidFile:
+    """The first of several errors of one file, which carries the others."""
+    first, *rest = errors
+    for one in rest:
+        one.others = ()
+    first.others = tuple(rest)
+    return first
 
 
 def checked(document: YamlDocument, model: type[Model]) -> Model:
@@ -77,9 +115,11 @@ def first_error(
     Returns:
         One error that names field, line, value and expectation.
     """
+    told = error.errors(include_url=False)
     found = [
         (_location(details, document.data), details)
-        for details in error.errors(include_url=False)
+        for one in told
+        for details in (one, *_of_any_shape(one, model))
     ]
 
     def rank(pair: tuple[Location, ErrorDetails]) -> tuple[bool, bool, int]:
@@ -87,12 +127,45 @@ def first_error(
         missing = kind == "missing"
         return at != ("vdsm_problem",) or missing, missing, document.line(at) or 0
 
-    first, *rest = sorted(found, key=rank)
-    more = f" (and {len(rest)} more)" if rest else ""
-    said = [(at, _problem(details, at, model)) for at, details in (first, *rest)]
-    raised = document.invalid(first[0], said[0][1] + more)
-    raised.others = tuple(document.invalid(*one) for one in said[1:])
-    return raised
+    return together(
+        [
+            document.invalid(at, _problem(details, at, model))
+            for at, details in sorted(found, key=rank)
+        ]
+    )
+
+
+def _of_any_shape(
+    details: ErrorDetails, model: type[FileModel]
+) -> Iterator[ErrorDetails]:
+    """What is wrong of something without a known shape, whatever its shape was to be.
+
+    That is what every shape refuses that knows the key.
+    """
+    given, loc = details["input"], details["loc"]
+    if not details["type"].startswith("union_tag") or not isinstance(given, dict):
+        return
+    shapes = _models(loc, model)
+    refused = {
+        tag: _refused(one, {**given, "shape": tag}) for tag, one in shapes.items()
+    }
+    for key in dict.fromkeys((*given, *_fields(shapes))):
+        knowing = [tag for tag, one in shapes.items() if key in _fields({tag: one})]
+        if not knowing:
+            where, value = (*loc, key), given[key]
+            yield {"type": "extra_forbidden", "loc": where, "msg": "", "input": value}
+        elif key != "shape" and (key in given or len(knowing) == len(shapes)):
+            each = [[e for e in refused[tag] if e["loc"][0] == key] for tag in knowing]
+            for one in each[0] if all(each) else ():
+                yield {**one, "loc": (*loc, knowing[0], *one["loc"])}
+
+
+def _refused(model: type[FileModel], data: dict[str, Any]) -> list[ErrorDetails]:
+    try:
+        model.model_validate(data)
+    except ValidationError as error:
+        return error.errors(include_url=False)
+    return []
 
 
 def _location(details: ErrorDetails, data: Data) -> Location:

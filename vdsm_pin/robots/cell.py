@@ -10,6 +10,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.io.problem_errors import Gathered
 from vdsm_pin.io.source import path_of
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -234,9 +235,13 @@ def read_cell(path: str | Path) -> Cell:
         InvalidFile: If the file or one that it names breaks its contract.
     """
     file = read_cell_file(path_of(path))
-    robot = read_robot(file.robot)
     required, required_self = file.required
-    found = file.scene(robot.reach, _others(robot), read_other)
+    each = Gathered()
+    robot = each.get(lambda: read_robot(file.robot))
+    size, links = (robot.reach, _others(robot)) if robot else (None, [])
+    found = each.get(lambda: file.scene(size, links, read_other))
+    each.end()
+    assert robot and found  # else what is wrong was told
     cell = Cell(
         robot=robot,
         scene=found.scene,

@@ -5,7 +5,7 @@ Nothing of geometry is worked out here; whoever reads a robot by itself begins h
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Final, NamedTuple, TypeAlias, get_args
@@ -18,7 +18,7 @@ from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import OtherReader, ReadRobot
 from vdsm_pin.io.problem_builder import joined
-from vdsm_pin.io.problem_errors import checked
+from vdsm_pin.io.problem_errors import Gathered, checked
 from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.problem_schema import AnyProblemModel
 from vdsm_pin.io.robot_schema import CoverKind, RobotModel
@@ -213,12 +213,12 @@ class CellFile:
         return float(self.frame.metres(asked[0])), float(self.frame.metres(asked[1]))
 
     def scene(
-        self, robot_size: float, links: Collection[str], read_robot: ReadRobot
+        self, robot_size: float | None, links: Collection[str], read_robot: ReadRobot
     ) -> "CellScene":
         """The obstacles in the robot's base frame, bodies of other robots the last.
 
         Args:
-            robot_size: For judging the size of a mesh; [m].
+            robot_size: For judging the size of a mesh; None where nobody knows; [m].
             links: Of the robot, besides the root link.
             read_robot: Reads the other robots.
 
@@ -227,16 +227,20 @@ class CellFile:
         """
         folder, frame, files = self.path.parent, self.frame, list[Path]()
         builder = ObstacleBuilder(self.document, frame, folder, sha256(), robot_size)
-        scene = Scene(builder.build_all(self.model.obstacles, ("obstacles",)))
-        named = files_of_obstacles(self.model.obstacles, folder)
-        if self.model.scene is not None:
-            files.append(folder / self.model.scene)
-            more, included = read_scene_with_files(files[0], robot_size, links)
-            scene = joined(scene, more.obstacles, self.document, "scene")
-            named = (*named, *included)
         others = OtherReader(self.document, frame, folder, read_robot)
-        found = others.read(self.model.others)
-        scene = joined(scene, found.bodies, self.document)
+        each, at = Gathered(), ("obstacles",)
+        solids = each.get(lambda: builder.build_all(self.model.obstacles, at))
+        found = each.get(lambda: others.read(self.model.others))
+        named = files_of_obstacles(self.model.obstacles, folder)
+        more: tuple[Scene, Named] | None = Scene(), ()
+        if self.model.scene is not None and robot_size is not None:
+            files.append(folder / self.model.scene)
+            read = partial(read_scene_with_files, files[0], robot_size, links)
+            more = each.get(read)
+        each.end()
+        assert solids is not None and found and more  # else what is wrong was told
+        scene = joined(Scene(solids), more[0].obstacles, self.document, "scene")
+        scene, named = joined(scene, found.bodies, self.document), (*named, *more[1])
         return CellScene(scene, (*files, *found.files), named)
 
     def errors(self, scene: Scene) -> ErrorBox:
