@@ -152,13 +152,13 @@ class Case:
 
 
 def random_case(rng: np.random.Generator, degree: int, resting: int | None) -> Case:
-    """A tree of joints of which some meet in one origin, and a body on it."""
+    """A tree of joints, some in one origin and some 1 m apart, and a body on it."""
     tree = random_tree(rng, int(rng.integers(2, 9)))
     joints = list(tree.joints)
     for j, joint in enumerate(joints):
-        if rng.integers(2):  # its origin is that of the frame that it hangs on
+        if kind := rng.integers(4):  # half of them where the frame is they hang on
             placed = np.array(joint.placement)
-            placed[:3, 3] = 0.0
+            placed[:3, 3] = np.eye(3)[rng.integers(3)] if kind == 3 else 0.0
             fields = {n: getattr(joint, n) for n in joint.__dataclass_fields__}
             joints[j] = Joint(**(fields | {"placement": placed}))
     tree = Tree(tuple(joints))
@@ -426,12 +426,15 @@ def test_each_pair_owns_up_to_what_it_was_not_judged(judged: tuple[int, int]) ->
 def test_a_plane_serves_up_to_the_first_bound_that_is_too_low_or_too_wide() -> None:
     rng = np.random.default_rng(8)
     for _ in range(200):
-        lower = rng.normal(0.5, 0.3, 4)
-        upper = lower + rng.choice([0.1, 0.3], 4)
+        size = rng.integers(1, 5)
+        lower = rng.normal(0.5, 0.3, size)
+        upper = lower + rng.choice([0.1, 0.3], size)
         slack, width = rng.choice([0.0, 0.2]), 0.15
-        good = (lower >= 0.2) & (upper - lower <= width + slack * upper)
+        bar = rng.choice([0.2, -1.0])
+        lower[0] -= rng.integers(2)
+        good = (lower >= bar) & (upper - lower <= width + slack * upper)
         first = int(np.argmin([*good, False]))
-        assert served(lower, upper, 0.2, slack, width) == first
+        assert served(lower, upper, bar, slack, width) == first
 
 
 def test_dense_rows_have_room_for_a_point_on_either_side() -> None:

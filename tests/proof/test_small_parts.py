@@ -44,6 +44,7 @@ from vdsm_pin.proof.layouts import (
     OTHER,
     OWN,
     SLICE,
+    SUPPORT,
     TIME,
     UP,
 )
@@ -82,6 +83,7 @@ new_bends, stay = plain(bends.new_bends), plain(bends.stay)
 bend_between, hold = plain(bends.bend_between), plain(cached_clearances.hold)
 raise_to_held = plain(cached_clearances.raise_to_held)
 keep_least, new_runs = plain(far_pairs.keep_least), plain(plane_bounds.new_runs)
+bound_below = plain(plane_bounds.bound_below)
 any_below, nominate = plain(results.any_below), plain(results.nominate)
 note_block, note_upper = plain(results.note_block), plain(results.note_upper)
 witness_at, mover_in = plain(witnesses.witness_at), plain(mover_of)
@@ -553,6 +555,27 @@ def test_a_held_clearance_falls_as_the_body_moves() -> None:
             truth[span] = np.maximum(lower[span], fallen[span])
             raise_to_held(mover, tracks, plane, first, last, lower)
             np.testing.assert_allclose(lower, truth, **EXACT)
+
+
+def test_one_plane_bounds_few_and_many_rows_alike() -> None:
+    """Of few intervals of many corners it goes corner by corner."""
+    rng, task = np.random.default_rng(13), pair_task((ACROSS,))
+    for corners in (1, 2, 3, 17, 24):
+        tracks, made = new_tracks(corners + 2, 64), new_runs(corners, 64)
+        tracks.places[:] = rng.normal(size=tracks.places.shape)
+        tracks.sags[:] = rng.uniform(size=tracks.sags.shape)
+        made.growth[:] = rng.uniform(size=made.growth.shape)
+        slots = rng.permutation(corners + 2)[:corners]
+        mover = mover_in(task, 0)._replace(slots=slots, lost=0.25)
+        plane = rng.normal(size=HELD_AT)
+        for first, last in ((0, 1), (3, 9), (20, 36), (0, 64)):
+            made.lower[:] = 7.0
+            bound_below(mover, tracks, made, plane, first, last)
+            along = np.einsum("c,kcr->kr", plane[:3], tracks.places[slots])
+            most = np.maximum(along[:, 1:], along[:, :-1]) + tracks.sags[slots]
+            truth, span = np.full(64, 7.0), slice(first, last)
+            truth[span] = plane[SUPPORT] - 0.25 - (most + made.growth).max(axis=0)[span]
+            np.testing.assert_allclose(made.lower[:64], truth, **EXACT)
 
 
 # ---- versions, witnesses, sizes ----------------------------------------------------

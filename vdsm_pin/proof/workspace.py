@@ -44,7 +44,6 @@ def forget(planes: FloatArray) -> None:
     planes[:] = 0.0
     for pair in range(planes.shape[0]):
         planes[pair, ROW] = pair
-    planes[:, 0] = 1.0
     planes[:, SUPPORT] = planes[:, HELD_CLEARANCE] = -np.inf
 
 

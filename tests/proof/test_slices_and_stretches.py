@@ -1,0 +1,183 @@
+"""Intervals that are subdivided, and the rows that say of each what was found.
+
+Oracles: poses by numpy, distances of points from pieces by closed forms.
+"""
+
+from math import ceil, floor
+
+import numpy as np
+import pytest
+from oracles.shortcuts import start_proof
+from oracles.tree_queries import TreeQuery, at, from_piece, make_query, unit
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.proof import stretches
+from vdsm_pin.proof.bodies import Body, Pair, PairTable
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.layouts import (
+    AT_LOWER,
+    AT_UPPER,
+    LOW,
+    OTHER,
+    OWN,
+    SLICES,
+    TIME,
+    UP,
+)
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import prove
+from vdsm_pin.proof.proving import Proving, dense_rows
+from vdsm_pin.proof.results import Dense
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
+from vdsm_pin.proof.tree import Joint, Kind, Tree
+
+
+def dense_of(proving: Proving) -> tuple[Dense, int]:
+    """What is found of each interval and pair, and the slices that it took."""
+    n = proving.n_intervals
+    dense = dense_rows(n, proving.n_pairs)
+    results = proving.new_results()._replace(dense=dense)
+    assert proving.fresh(results).sweep(0, n)
+    return dense, int(results.tally[SLICES])
+
+
+def touches(pose: FloatArray, body: Body, point: FloatArray) -> float:
+    """How far a point of the world is from the surface of a body; [m]."""
+    local = np.linalg.inv(pose) @ [*point, 1.0]
+    found = [from_piece(local[None, :3], piece)[0] for piece in body.pieces]
+    return float(min(found))
+
+
+def subdivided(seed: int, off: float) -> tuple[TreeQuery, Dense, list[Body]]:
+    """A motion of which a limit so far below what is met is not seen by one plane."""
+    rng = np.random.default_rng([seed, 31])
+    while True:
+        query = make_query(rng, int(rng.choice([1, 3])), int(rng.integers(2, 8)))
+        if not 0.01 < query.share < 0.99 or query.nearest < 0.01:
+            continue
+        pairs = PairTable.of([Pair(0, 1, query.nearest - off)])
+        asked = query.tree, query.bodies, query.path, pairs
+        proving, plan = start_proof(*asked)
+        dense, slices = dense_of(proving)
+        if slices > 1 and len(plan.owner) == 1:
+            order = -1 if plan.swapped[0] else 1
+            return query, dense, [*query.bodies][::order]
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("off", [1e-5, -1e-5])
+def test_witnesses_of_a_subdivided_interval_stand_where_its_time_says(
+    seed: int, off: float
+) -> None:
+    """On both surfaces, as far from each other as the upper bound says."""
+    query, dense, bodies = subdivided(seed, off)
+    time, upper = dense.time[0, 0], dense.upper[0, 0]
+    assert dense.verdict[0, 0] == (CERTIFIED if off > 0.0 else REFUTED)
+    assert dense.lower[0, 0] <= query.nearest <= upper + 1e-9
+    poses = query.tree.poses(at(query.path, np.array([time])))[0]
+    own, other = dense.own[0, 0], dense.other[0, 0]
+    for body, point in zip(bodies, (own, other), strict=True):
+        assert touches(poses[body.frame], body, point) == pytest.approx(0.0, abs=1e-7)
+    assert np.linalg.norm(own - other) == pytest.approx(upper, abs=1e-7)
+
+
+@pytest.mark.parametrize("slices", range(1, 8))
+def test_few_slices_end_undecided(slices: int) -> None:
+    """A ball comes within 1 um of a limit that takes many slices to prove."""
+    turn = Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    bodies = [Body(1, (Hull(np.array([[1.0, 0.0, 0.0]]), 0.1),)),
+              Body(0, (Hull(np.array([[2.0, 0.0, 0.0]]), 0.1),))]  # fmt: skip
+    path, pairs = Path(np.array([[-1.0], [1.1]])), [Pair(0, 1, 0.8 - 1e-6)]
+    budget = Budget(slices=slices)
+    assert prove(turn, bodies, path, pairs).is_certified
+    proving, _ = start_proof(turn, bodies, path, PairTable.of(pairs), budget=budget)
+    dense, used = dense_of(proving)
+    assert dense.verdict[0, 0] == UNDECIDED
+    assert 1 <= used <= slices
+    assert dense.lower[0, 0] < 0.8 <= dense.upper[0, 0] + 1e-9
+
+
+def test_a_new_plane_is_as_good_as_a_part_of_the_slack() -> None:
+    """Of solids a thousandth of a metre apart and of those a metre apart alike."""
+    rng, tree = np.random.default_rng(5), Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    for gap in np.geomspace(1e-3, 1.0, 24):
+        toward = unit(rng)
+        corners = rng.uniform(-0.2, 0.2, (2, 12, 3))
+        corners[0] -= (corners[0] @ toward).max() * toward
+        corners[1] += (gap - (corners[1] @ toward).min()) * toward
+        bodies = [Body(1, (Hull(corners[0]),)), Body(0, (Hull(corners[1]),))]
+        pairs = PairTable.of([Pair(0, 1)])
+        proving, _ = start_proof(tree, bodies, Path(np.zeros((1, 1))), pairs)
+        dense, _ = dense_of(proving)
+        lower, upper = dense.lower[0, 0], dense.upper[0, 0]
+        assert gap - 1e-9 <= upper
+        rough = 0.1 * Budget().slack * upper
+        assert upper - 1.01 * rough - 1e-8 <= lower <= upper
+
+
+def test_slices_of_a_stretch_end_where_it_ends() -> None:
+    for low, high in [(0.25, 0.5), (1.25, 1.5), (0.5, 3.0), (2.0, 2.0), (0.75, 3.25),
+                      (4.0, 4.0), (3.5, 4.0), (0.0, 0.0)]:  # fmt: skip
+        found = stretches._slices(low, high, 4)
+        k, start, end = found.T
+        assert (k + start)[0] == low and (k + end)[-1] == high
+        assert ((start >= 0.0) & (start <= end) & (end <= 1.0)).all()
+        assert np.array_equal((k + end)[:-1], (k + start)[1:])
+        assert np.array_equal(k, k[0] + np.arange(len(k))) and (k < 4).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_stretch_has_the_least_of_its_slices(seed: int) -> None:
+    """Where, when and between which points, as of each slice by itself."""
+    rng = np.random.default_rng([seed, 37])
+    turn = Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    bodies = [Body(1, (Hull(np.array([[1.0, 0.0, 0.0]]), 0.1),)), *(
+        Body(0, (Hull(rng.uniform(-1.0, 1.0, (1, 3)) + 0.5, 0.05),))
+        for _ in range(3)
+    )]  # fmt: skip
+    pairs = [Pair(0, k, 0.02) for k in (1, 2, 3)]
+    path = Path(rng.uniform(-3.0, 3.0, (6, 1)))
+    proving, _ = start_proof(turn, bodies, path, PairTable.of(pairs))
+    asked = proving.task, proving.motion, proving.work, np.arange(3)
+    for low, high in [(0.25, 4.5), (1.0, 3.75), (2.25, 2.5), (0.5, 5.0)]:
+        slices = stretches._slices(low, high, 5)
+        runs = [slices, *np.split(slices, len(slices))]
+        made = [proving.new_results() for _ in runs]
+        for one, some in zip(made, runs, strict=True):
+            stretches._judge_slices(*asked, one.best, one.counts, some)
+        whole, best = made[0].best, np.array([one.best for one in made[1:]])
+        assert np.array_equal(made[0].counts, sum(one.counts for one in made[1:]))
+        np.testing.assert_allclose(whole[:, LOW], best[..., LOW].min(0), atol=1e-9)
+        np.testing.assert_allclose(whole[:, UP], best[..., UP].min(0), atol=1e-9)
+        for pair, got in enumerate(whole):
+            least = int(np.argmin(best[:, pair, LOW]))
+            assert got[AT_LOWER] == slices[least, 0]
+            k = int(got[AT_UPPER])
+            angle = at(Path(path.knots[k : k + 2]), got[TIME : TIME + 1])[0, 0]
+            ball = np.array([np.cos(angle), np.sin(angle), 0.0])
+            way = bodies[1 + pair].pieces[0].points[0] - ball
+            away = np.linalg.norm(way)
+            assert got[UP] == pytest.approx(away - 0.15, abs=1e-9)
+            own, other = got[OWN:OTHER], got[OTHER:]
+            np.testing.assert_allclose(own, ball + 0.1 * way / away, atol=1e-9)
+            np.testing.assert_allclose(other, own + got[UP] * way / away, atol=1e-9)
+
+
+@pytest.mark.parametrize("low", [0.0, 0.25, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("high", [2.0, 2.5, 3.0])
+def test_a_stretch_begins_and_ends_where_it_is_asked(low: float, high: float) -> None:
+    """Of a ball that leaves and one that comes each is nearest at its own end."""
+    slide = Tree((Joint(0, Kind.PRISMATIC, (1.0, 0.0, 0.0), column=0),))
+    bodies = [Body(frame, (Hull(np.array([[x, 0.0, 0.0]]), 0.1),))
+              for frame, x in ((1, 0.0), (0, -1.0), (0, 5.0))]  # fmt: skip
+    pairs = PairTable.of([Pair(0, 1), Pair(0, 2)])
+    path = Path(np.arange(4.0)[:, None])
+    proving, _ = start_proof(slide, bodies, path, pairs)
+    found, in_time = stretches.Stretches(proving, np.arange(2)).over(low, high)
+    touched = max(1, ceil(high) - floor(low))
+    assert in_time and found.counts[:, CERTIFIED].tolist() == [touched] * 2
+    np.testing.assert_allclose(found.best[:, UP], [0.8 + low, 4.8 - high], atol=1e-9)
+    np.testing.assert_allclose(
+        found.best[:, AT_UPPER] + found.best[:, TIME], [low, high], atol=1e-12
+    )
