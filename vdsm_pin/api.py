@@ -53,7 +53,8 @@ def plan(
 
     Args:
         problem: What is asked.
-        strategy: `fewest`, `clearest`, `sturdiest`, `paper` or `follow-the-leader`.
+        strategy: `fewest`, `clearest`, `sturdiest`, `follow-the-leader`,
+            `paper` or `paper-clearest`.
         time_limit: Until there is a plan that is proved; None for none; [s].
 
     Returns:

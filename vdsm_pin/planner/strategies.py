@@ -25,6 +25,7 @@ STRATEGIES: Final[Mapping[str, str]] = MappingProxyType(
         "sturdiest": "vdsm_pin.planner.fewest.strategy:plan_sturdiest",
         "follow-the-leader": "vdsm_pin.planner.leader:plan_follow_the_leader",
         "paper": "vdsm_pin.planner.paper.pipeline:plan_paper",
+        "paper-clearest": "vdsm_pin.planner.paper.clearest:plan_paper_clearest",
     }
 )
 """Module and function of every strategy a user may name; the first is the default."""

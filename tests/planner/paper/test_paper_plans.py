@@ -1,5 +1,6 @@
 """Whole plans of the paper's rule: published numbers, random scenes, refusals."""
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 
@@ -17,6 +18,8 @@ from vdsm_pin.errors import (
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism, Sphere
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.largest_margin import drawn_length
+from vdsm_pin.planner.paper.clearest import plan_paper_clearest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.desired_path import Approach, Blocked
@@ -104,6 +107,41 @@ def check_between_waypoints(plan: Plan) -> None:
 @pytest.mark.parametrize("name", ALL)
 def test_paper_scenes_keep_every_promise(name: str) -> None:
     check_plan(plan_of(name))
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "too_much"),
+    [
+        ("obs1", 10.0e-3, 15e-3),
+        ("obs2-small", 57.7e-3, 68e-3),
+        ("obs3", 338.2e-3, 345e-3),
+    ],
+)
+def test_the_widest_region_is_found_that_draws_as_much(
+    name: str, most: float, too_much: float
+) -> None:
+    """Docs' numbers; the proof is the judge, and a wider region draws less."""
+    problem, first = paper(name), plan_of(name)
+    clearance = link_clearance(problem)
+    plan = plan_paper_clearest(problem, clearance, 0.0)
+    check_plan(plan)
+    assert drawn_length(plan) >= drawn_length(first) - 1e-9
+    asked = replace(problem, required_clearance=most)
+    assert verify(asked, plan.trajectory).verdict is Verdict.CERTIFIED
+    at_start = float(clearance(plan.centres[:1]).min())
+    if at_start - most < 1e-3:  # no plan keeps more than the arm as it starts
+        return
+    with suppress(Infeasible):
+        margin = too_much - problem.required_clearance
+        wider = plan_paper(problem, clearance, margin)
+        assert drawn_length(wider) < drawn_length(first) - 1e-3
+
+
+def test_without_a_wider_region_the_plan_is_that_of_the_rule() -> None:
+    for name in ("free", "obs2"):
+        plan = plan_paper_clearest(paper(name), link_clearance(paper(name)), 0.0)
+        assert plan.strategy == "paper-clearest"
+        np.testing.assert_array_equal(plan.centres, plan_of(name).centres)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from vdsm_pin.planner.fewest.explain import (
 from vdsm_pin.planner.fewest.explore import Outcome, explore
 from vdsm_pin.planner.fewest.joint_error import levers
 from vdsm_pin.planner.fewest.judge import check_cone
-from vdsm_pin.planner.fewest.largest_margin import drawn_length, widest
 from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort, pointed
 from vdsm_pin.planner.fewest.motion import Corners, Rows, dense_rows
 from vdsm_pin.planner.fewest.roadmap import CostWeights
@@ -34,6 +33,7 @@ from vdsm_pin.planner.fewest.unbend import (
     unbend,
     with_unbending,
 )
+from vdsm_pin.planner.largest_margin import drawn_length, told, widest
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem.desired_path import Blocked
@@ -42,7 +42,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import in_mm
 
 SEARCHED: Final = 0.6
 """Part of the time after which a search ends that has found something; [-]."""
@@ -86,8 +85,7 @@ def plan_clearest(
     plan = plans[-1]
     if not problem.scene.obstacles:
         return plan
-    most = search.kept + reserve
-    note = f"of the plans tried none with a clearance above {in_mm(most)} draws as much"
+    note = told(search.kept + reserve)
     return replace(plan, notes=(*plan.notes, note))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import in_mm
 
 ROUNDS: Final = 6
 """Halvings of the reserve; the last tells it to 1/64 of where it was sought."""
@@ -20,8 +21,17 @@ def drawn_length(plan: Plan) -> float:
     return float(step[on[:-1] & on[1:]].sum())
 
 
+def told(kept: float) -> str:
+    """What was found out, by the clearance that the last plan was to keep; [m]."""
+    return f"of the plans that were to keep more than {in_mm(kept)} none draws as much"
+
+
 def widest(
-    plan_with: Callable[[float], Plan], first: Plan, low: float, high: float
+    plan_with: Callable[[float], Plan],
+    first: Plan,
+    low: float,
+    high: float,
+    rounds: int = ROUNDS,
 ) -> tuple[list[Plan], float]:
     """Plans with more and more in reserve that draw as much as the first one.
 
@@ -30,12 +40,13 @@ def widest(
         first: What there is without any search.
         low: A reserve it has.
         high: A reserve that nothing has.
+        rounds: Most halvings.
 
     Returns:
         The plans, the first one included, and the reserve of the last.
     """
     plans, whole = [first], drawn_length(first) - TOLERANCES.joint_centre
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         if not low < high < np.inf:
             break
         middle = (low + high) / 2.0

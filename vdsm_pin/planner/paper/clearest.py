@@ -1,0 +1,39 @@
+"""The strategy `paper-clearest`: the paper's rule, as far from obstacles as it goes.
+
+"The path is planned as far from the surface as possible" (section 4.2).
+"""
+
+from dataclasses import replace
+from typing import Final
+
+from vdsm_pin.planner.largest_margin import told, widest
+from vdsm_pin.planner.paper.pipeline import plan_paper
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan
+from vdsm_pin.problem.planning_problem import PlanningProblem
+
+ROUNDS: Final = 10
+"""Halvings; the last tells the reserve to 1/1024 of where it was sought."""
+
+
+def plan_paper_clearest(
+    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+) -> Plan:
+    """The plan of the paper's rule with the widest danger region that draws as much.
+
+    Arguments and errors are those of `plan_paper`.
+    """
+    required, name = problem.required_clearance, "paper-clearest"
+    first = plan_paper(problem, clearance, margin)
+    if not problem.scene.obstacles:
+        return replace(first, strategy=name)
+    low = float(clearance(first.centres).min()) - required
+    high = float(clearance(first.centres[:1]).min()) - required
+    plans, reserve = widest(
+        lambda more: plan_paper(problem, clearance, margin + more),
+        first,
+        max(low, 0.0),
+        high,
+        rounds=ROUNDS,
+    )
+    notes = (*plans[-1].notes, told(required + reserve))
+    return replace(plans[-1], strategy=name, notes=notes)
