@@ -23,7 +23,7 @@ STEPS: Final = (
 )  # fmt: skip
 WIDE, HIGH, PITCH = 3.1, 0.34, 0.52
 AFTER: Final = (
-    ("Coal measures every waypoint", "", "verification/coal_missing.py"),
+    ("Coal measures every waypoint", "", "margins.py"),
     ("the proof covers what lies between", "Eq. 22-24", "verification/verify.py"),
 )
 

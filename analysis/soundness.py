@@ -49,7 +49,7 @@ from oracles.tree_queries import at as tree_rows
 from oracles.tree_queries import clearances, make_query, random_box, wrong_poses
 
 from vdsm_pin.arm.bodies import arm_bodies
-from vdsm_pin.arm.tree import arm_tree, link_frame
+from vdsm_pin.arm.kinematics import arm_tree, link_frame
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.solids import ConvexCover
@@ -59,12 +59,11 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.budget import Budget, rounding_pad
-from vdsm_pin.proof.error_box import ErrorBox as ProofBox
+from vdsm_pin.proof.bodies import ErrorBox as ProofBox
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
-from vdsm_pin.proof.proving import new_proving
+from vdsm_pin.proof.proving import Budget, new_proving, rounding_pad
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from vdsm_pin.app.explanation.canvas import Canvas
 from vdsm_pin.app.explanation.cross import DIRECTIONS, crosses
 from vdsm_pin.app.explanation.folder import explain_to_folder
+from vdsm_pin.app.explanation.pictures import Canvas
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import InvalidInput, NoPlanFound
 from vdsm_pin.geometry.solids import Cylinder

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 
 import vdsm_pin.refinement as refinement
+from vdsm_pin import margins
 from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
@@ -23,7 +24,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification import coal_check, coal_missing
+from vdsm_pin.verification import coal_check
 from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
@@ -152,7 +153,7 @@ def test_with_a_coal_that_reports_less_the_plan_keeps_so_much_more(
     assert not honest.rounds[0].adjustments
     before = honest.verification.min_clearance
     error = 0.005 + before - problem.required_clearance
-    monkeypatch.setattr(coal_missing, "CoalArm", off_by(-error))
+    monkeypatch.setattr(margins, "CoalArm", off_by(-error))
     careful = refinement.plan_and_verify(problem, name)
     assert careful.verification.min_clearance >= before + 0.005
     first = careful.rounds[0]
@@ -169,7 +170,7 @@ def test_what_keeps_much_anyway_keeps_more_where_coal_finds_it_missing(
     name: str, error: float, again: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = replace(short("obs3"), required_clearance=0.010)
-    monkeypatch.setattr(coal_missing, "CoalArm", off_by(-error))
+    monkeypatch.setattr(margins, "CoalArm", off_by(-error))
     careful = refinement.plan_and_verify(problem, name)
     assert careful.verification.min_clearance >= problem.required_clearance + error
     assert (len(careful.rounds) > 1) == again
@@ -183,7 +184,7 @@ def test_with_a_coal_that_reports_more_no_plan_is_returned(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = short("obs3")
-    for module in (coal_missing, coal_check):
+    for module in (margins, coal_check):
         monkeypatch.setattr(module, "CoalArm", off_by(0.005))
     with pytest.raises(NoPlanFound, match="Coal"):
         refinement.plan_and_verify(problem, name)

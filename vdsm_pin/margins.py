@@ -4,21 +4,26 @@ A margin of each link and obstacle is raised by what Coal or the proof finds mis
 """
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.time_limit import Deadline
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.coal_missing import coal_missing
+from vdsm_pin.verification.coal_arm import CoalArm
 from vdsm_pin.verification.records import ArmVerification
 
 OVERSHOOT: Final = 1.25
 """The margin grows by this times what is missing, as a plan with a larger margin also
 swings a little farther; [-]."""
+
+NEAR: Final = 0.5
+"""Pairs are measured by Coal up to this part of the body's radius past the required
+clearance; [-]."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,56 @@ class Adjustment:
     measured_by: Literal["Coal", "proof"]
     distance: float
     margin: float
+
+
+class Missing(NamedTuple):
+    """A link that comes nearer to an obstacle than required, where it comes nearest.
+
+    Args:
+        waypoint: Row of the trajectory, from 0.
+        link: 1 to N.
+        obstacle: Number of the obstacle in the scene, from 0.
+        distance: What Coal measures; [m].
+    """
+
+    waypoint: int
+    link: int
+    obstacle: int
+    distance: float
+
+
+def coal_missing(
+    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline = NO_LIMIT
+) -> tuple[Missing, ...]:
+    """Links that miss the required clearance at a row, as Coal measures it.
+
+    Coal measures, the planner moves joints, the proof judges: this is no verdict.
+
+    Args:
+        problem: The scene and the required clearance.
+        trajectory: Every row is looked at.
+        deadline: When to give up.
+
+    Returns:
+        One entry for each link and obstacle held apart that come too near, at their
+        worst row, in the order of links and obstacles. A distance that Coal cannot tell
+        is no reason to move: the proof decides.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    worst: dict[tuple[int, int], Missing] = {}
+    arm, n_links = CoalArm(problem, deadline, links=False), problem.manipulator.n_links
+    room = NEAR * problem.manipulator.most_radius
+    for found in arm.near(trajectory, room, deadline=deadline):
+        short = found.distance < problem.required_clearance
+        for k in np.flatnonzero(short & np.isfinite(found.distance)):
+            pair, distance = found.pair[k], float(found.distance[k])
+            link = min(int(arm.pairs.one[pair]) + 1, n_links)
+            key = link, int(arm.pairs.other[pair]) - arm.pairs.n_own
+            if key not in worst or distance < worst[key].distance:
+                worst[key] = Missing(int(found.moment[k]), *key, distance)
+    return tuple(worst[key] for key in sorted(worst))
 
 
 def by_coal(

@@ -22,11 +22,10 @@ import pytest
 from batch_folders import tree
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
-import vdsm_pin.batch.inputs as inputs_module
+import vdsm_pin.batch.folders as inputs_module
 import vdsm_pin.batch.run as run_module
 import vdsm_pin.batch.worker as worker_module
-from vdsm_pin.batch.folders import folder_names
-from vdsm_pin.batch.inputs import expanded, passed_over
+from vdsm_pin.batch.folders import expanded, folder_names, passed_over
 from vdsm_pin.batch.pool import Ended
 from vdsm_pin.batch.run import Batch, Interrupted, run_batch
 from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Settings, Task

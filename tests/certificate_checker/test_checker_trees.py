@@ -18,7 +18,7 @@ from oracles.tree_queries import (
 )
 
 from vdsm_pin.certificate_checker.balls import Rejected
-from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.bodies import ErrorBox
 
 Rng = np.random.Generator
 MOST_SLICES = 60

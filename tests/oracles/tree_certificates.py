@@ -11,9 +11,8 @@ from vdsm_pin.certificate_checker.motion import Branch, Path
 from vdsm_pin.certificate_checker.solids import Body, Pair, Solid
 from vdsm_pin.certificate_checker.tree import Joint, Tree
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece
+from vdsm_pin.proof.bodies import ErrorBox, PairTable
 from vdsm_pin.proof.bodies import Pair as Asked
-from vdsm_pin.proof.bodies import PairTable
-from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.recording import record
 

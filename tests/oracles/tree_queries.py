@@ -13,8 +13,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
-from vdsm_pin.proof.bodies import Body
-from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.bodies import Body, ErrorBox
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 

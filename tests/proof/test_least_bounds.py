@@ -10,8 +10,7 @@ from oracles.tree_queries import random_path, random_tree, unit
 
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.proof import broad_phase, far_pairs, least_bracket, row_places
-from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.layouts import BEST, KEY, LOW, PAIR, SLICE
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.terms import ACROSS, Rules

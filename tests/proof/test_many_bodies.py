@@ -20,9 +20,8 @@ from oracles.tree_queries import (
 from vdsm_pin.geometry.arrays import FloatArray, same_arrays
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof import rows, workspace
-from vdsm_pin.proof.bodies import Body, Pair, PairTable
+from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.broad_phase import FEW
-from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove
 from vdsm_pin.proof.proving import dense_rows

@@ -7,8 +7,7 @@ import pytest
 from oracles.tree_queries import random_tree, unit
 
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, ends_of
-from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.moving_sides import FEW
 from vdsm_pin.proof.packed_tree import FIXED, PRISMATIC, REVOLUTE, pack_tree
 from vdsm_pin.proof.packing import for_motion, pack_task, with_errors

@@ -14,7 +14,6 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof import stretches
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -27,7 +26,7 @@ from vdsm_pin.proof.layouts import (
 )
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
-from vdsm_pin.proof.proving import Proving, dense_rows
+from vdsm_pin.proof.proving import Budget, Proving, dense_rows
 from vdsm_pin.proof.results import Dense
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree

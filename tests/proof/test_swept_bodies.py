@@ -7,14 +7,13 @@ import pytest
 from oracles.tree_queries import random_box, random_path, random_tree, wrong_poses
 from some_slow import few_of
 
+from vdsm_pin.arm.kinematics import arm_tree
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.arm.tree import arm_tree
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import body_reach
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.proof.bends import bend_between
-from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.error_growth import crude_growth
 from vdsm_pin.proof.motions import interpolate
 from vdsm_pin.proof.packed_tree import place_tree

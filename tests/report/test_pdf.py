@@ -7,8 +7,8 @@ import made_up
 import pytest
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.report.browser import find_browser, print_page
 from vdsm_pin.report.facts import verification_file
+from vdsm_pin.report.film import find_browser, print_page
 from vdsm_pin.report.html import write_report
 
 

@@ -14,14 +14,14 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
-from vdsm_pin.report.run_record import now
-from vdsm_pin.report.scene_rows import (
+from vdsm_pin.report.inputs import (
     CHANGED,
     MOST_LISTED,
     SceneRow,
     scene_rows,
     scene_words,
 )
+from vdsm_pin.report.run_record import now
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TETRAHEDRON = """\

@@ -19,8 +19,7 @@ from vdsm_pin.report.tables import (
     write_summary,
 )
 from vdsm_pin.report.thinning import nearest_obstacles
-from vdsm_pin.verification.brackets import LeastClearances
-from vdsm_pin.verification.coal_rows import CoalRows
+from vdsm_pin.verification.brackets import CoalRows, LeastClearances
 from vdsm_pin.verification.records import Pair
 
 

@@ -14,13 +14,13 @@ from tests.robots.test_robots import URDF, mutated, write
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
+from vdsm_pin.robots.by_itself import pose_difference
 from vdsm_pin.robots.cell import cell_of
 from vdsm_pin.robots.files import MeshCover, RobotFiles, solids_of
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.verification.coal_pairs import link_shapes
+from vdsm_pin.verification.coal_shapes import link_shapes
 
 SRDF = """<robot name="two">
   <virtual_joint name="cart" type="planar" parent_frame="w" child_link="base"/>

@@ -18,11 +18,11 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
 from vdsm_pin.report.robot_facts import reached
+from vdsm_pin.robots.by_itself import pose_difference
 from vdsm_pin.robots.cell import Cell, cell_of, read_cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import NEAR, verify_robot
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.clearance_check import OBSTACLES

@@ -19,17 +19,16 @@ from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.report.inputs import scene_words
 from vdsm_pin.report.page_data import report_data
 from vdsm_pin.report.robot_facts import robot_facts
-from vdsm_pin.report.scene_rows import scene_words
 from vdsm_pin.robots.by_itself import POSES
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.files import HULLS, MeshCover, RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.verification.coal_pairs import link_shapes
-from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides, link_shapes
 from vdsm_pin.verification.records import Verdict
 
 RADIUS, REQUIRED = {"left": 0.05, "right": 0.08}, 0.01
@@ -285,7 +284,7 @@ def test_random_pairs_keep_what_dense_samples_by_coal_say(
         one = pair.link - 1
         both = len(robots[0].bodies) + numbers.index(pair.obstacle.removeprefix("b: "))
         sides = Sides(rows, np.full(len(at), one), np.full(len(at), both))
-        least = max(float(coal.distances(placed, sides).distance.min()), 0.0)
+        least = max(float(coal.distances(placed, sides).min()), 0.0)
         assert found.least.lower[k] <= least + 5e-6
         assert least <= max(found.least.upper[k], 0.0) + 5e-3
     if found.verdict is Verdict.CERTIFIED:

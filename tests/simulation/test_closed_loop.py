@@ -17,10 +17,10 @@ from vdsm_pin.simulation.folder import (
     SUMMARY,
     SimulationOrder,
     cleared,
+    show_simulation,
     simulate_to_folder,
 )
 from vdsm_pin.simulation.settings import Controller, Kick, Sensors, Settings, Speed
-from vdsm_pin.simulation.terminal import show_simulation
 from vdsm_pin.simulation.time_law import row_times
 
 pytest.importorskip("mujoco")

@@ -227,7 +227,7 @@ def distances(
             from vdsm_pin.verification.coal_hulls import CoalBody
 
             partner = (CoalBody(*placed[pair.label]),)
-        gap = measure(request, *placed[pair.own], partner).distance
+        gap = measure(request, *placed[pair.own], partner)
         if np.isfinite(gap):
             found[k] = gap
     return found

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vdsm_pin import margins
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.arm.mounted import Feed
 from vdsm_pin.certificate_writer import lines as certificate_lines
@@ -35,11 +36,9 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import (
     clearance,
     clearances,
-    coal_missing,
+    coal_check,
     counterexample,
-    proved_lowers,
 )
-from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.brackets import (
     ClearanceChunk,
     ClearanceProfile,
@@ -58,9 +57,8 @@ from vdsm_pin.verification.clearance_check import (
 )
 from vdsm_pin.verification.clearances import in_rows, profile_of
 from vdsm_pin.verification.coal_arm import CoalDistances, _Moved
-from vdsm_pin.verification.coal_check import CoalEvidence
-from vdsm_pin.verification.coal_missing import NEAR
-from vdsm_pin.verification.coal_pairs import CoalPairs
+from vdsm_pin.verification.coal_check import CoalEvidence, LowersSink, ProvedLowers
+from vdsm_pin.verification.coal_shapes import CoalPairs
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
     Inside,
@@ -70,6 +68,7 @@ from vdsm_pin.verification.enclosed import (
 )
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import Place
+from vdsm_pin.verification.judgement import nearest_pairs
 from vdsm_pin.verification.moving import (
     MOST_PARTS,
     PART,
@@ -77,7 +76,6 @@ from vdsm_pin.verification.moving import (
     in_short_parts,
     whole_rows,
 )
-from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.records import Check, Counterexample, Pair, Verdict
 from vdsm_pin.verification.task import arm_assembly
 
@@ -341,10 +339,10 @@ def test_bounds_are_kept_where_they_fit(
     rng, asked = np.random.default_rng(7), problem()
     motion: Any = SimpleNamespace(n_samples=6)
     columns = 3 * ARM.axis_radii.size
-    monkeypatch.setattr(proved_lowers, "COMPARED", 5 * columns + spare)
+    monkeypatch.setattr(coal_check, "COMPARED", 5 * columns + spare)
     sink = LowersSink(asked, motion)
     assert sink.fits is (spare == 0)
-    monkeypatch.setattr(proved_lowers, "COMPARED", 5 * 4 + spare)
+    monkeypatch.setattr(coal_check, "COMPARED", 5 * 4 + spare)
     pairs, parts = (
         np.array([3, 1, 6, 2]),
         [random_chunk(rng, k, n, 4) for k, n in ((0, 2), (2, 3))],
@@ -383,35 +381,28 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
     for part in range(3):
         n = 60
         gaps = rng.choice([-0.2, 0.0, 0.1, 0.3, 0.5, 0.7, -np.inf], n)
-        pair, points = rng.choice(of_obstacles, n), rng.normal(size=(2, n, 3))
-        points[1, ::7] = points[0, ::7]
+        pair = rng.choice(of_obstacles, n)
         moments, unknown = np.arange(n) + n * part, np.zeros(n)
-        parts.append(CoalDistances(
-            moments + 0.0, pair, gaps, unknown, unknown, points[0], points[1]
-        ))  # fmt: skip
+        parts.append(CoalDistances(moments + 0.0, pair, gaps, unknown, unknown))
         for k in range(n):
             other = int(pairs.other[pair[k]]) - pairs.n_own
             if not (np.isfinite(gaps[k]) and gaps[k] < 0.5):
                 continue
             key = min(int(pairs.one[pair[k]]) + 1, ARM.n_links), other
             if key not in expected or gaps[k] < expected[key][1]:
-                way = (points[0, k] - points[1, k]) * (1.0 if gaps[k] >= 0.0 else -1.0)
-                size = np.linalg.norm(way)
-                expected[key] = k + n * part, gaps[k], way / size if size else way
+                expected[key] = k + n * part, gaps[k]
 
     def near(motion: str, room: float, **_: Any) -> Any:
-        assert room == NEAR * ARM.most_radius
+        assert room == margins.NEAR * ARM.most_radius
         return parts
 
     arm = SimpleNamespace(near=near, pairs=pairs, problem=asked)
-    monkeypatch.setattr(coal_missing, "CoalArm", lambda *_, **__: arm)
+    monkeypatch.setattr(margins, "CoalArm", lambda *_, **__: arm)
     blank: Any = None
-    found = coal_missing.coal_missing(asked, blank)
+    found = margins.coal_missing(asked, blank)
     assert [(one.link, one.obstacle) for one in found] == sorted(expected)
     for one in found:
-        waypoint, gap, normal = expected[one.link, one.obstacle]
-        assert (one.waypoint, one.distance) == (waypoint, gap)
-        np.testing.assert_allclose(one.normal, normal, atol=1e-15)
+        assert (one.waypoint, one.distance) == expected[one.link, one.obstacle]
 
 
 @pytest.mark.parametrize("travel", [0.0, 0.3, 2.0])
@@ -734,7 +725,7 @@ def test_without_obstacles_nothing_is_missing() -> None:
     problem = PlanningProblem("p", ARM, Scene(), None, 0.1, np.eye(4))
     still, rows = np.zeros(2), np.zeros((2, ARM.n_links))
     motion = Trajectory(still > 0, still, still, rows, rows)
-    assert coal_missing.coal_missing(problem, motion) == ()
+    assert margins.coal_missing(problem, motion) == ()
 
 
 def test_counterexamples_are_told_in_rows_of_the_trajectory() -> None:

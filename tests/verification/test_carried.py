@@ -23,8 +23,8 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.reason import reason
-from vdsm_pin.verification.approaches import _station
 from vdsm_pin.verification.coal_check import COAL
+from vdsm_pin.verification.judgement import _station
 from vdsm_pin.verification.records import (
     ClosestApproach,
     Pair,

@@ -28,8 +28,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.coal_pairs import assembly_shapes
-from vdsm_pin.verification.coal_shapes import Sides
+from vdsm_pin.verification.coal_shapes import Sides, assembly_shapes
 from vdsm_pin.verification.pinocchio_arm import PinocchioArm, load_arm
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.task import arm_assembly
@@ -150,7 +149,7 @@ def by_coal(obstacle: scene.Obstacle, q: FloatArray) -> FloatArray:
     row, link = (a.ravel() for a in np.indices((len(q), N_LINKS)))
     shapes = assembly_shapes(arm_assembly(problem_of(obstacle)))
     other = np.full(link.size, N_LINKS)
-    found = shapes.distances(poses, Sides(row, link, other)).distance
+    found = shapes.distances(poses, Sides(row, link, other))
     return found.reshape(len(q), N_LINKS)
 
 

@@ -11,7 +11,7 @@ import trimesh
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry import solids
-from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem import scene
 from vdsm_pin.problem.desired_path import DesiredPath
@@ -21,11 +21,9 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_check
 from vdsm_pin.verification import coal_shapes as measuring
-from vdsm_pin.verification.approaches import CLOSEST
 from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances, coal_reach
-from vdsm_pin.verification.coal_bodies import Measured
-from vdsm_pin.verification.coal_check import CoalLog, check_coal
-from vdsm_pin.verification.proved_lowers import ProvedLowers
+from vdsm_pin.verification.coal_check import CoalLog, ProvedLowers, check_coal
+from vdsm_pin.verification.judgement import CLOSEST
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
 
@@ -105,9 +103,6 @@ def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
     assert sum(chunk.moment.size for chunk in found) == 25 * 8 * 3
     for chunk in found:
         assert chunk.disagreement.max() < 2e-7
-        apart = chunk.distance > 0.0
-        gap = np.linalg.norm(chunk.other_point - chunk.own_point, axis=1)
-        np.testing.assert_allclose(gap[apart], chunk.distance[apart], atol=1e-6)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -210,10 +205,10 @@ def test_a_wrong_distance_is_noticed_on_both_sides(
 ) -> None:
     honest = measuring.measure_each
 
-    def lying(*arguments: object) -> Measured:
+    def lying(*arguments: object) -> FloatArray:
         found = honest(*arguments)
         error = sign * excess * TOLERANCES.coal_agreement
-        return Measured(found.distance + error, found.near, found.far)
+        return found + error
 
     monkeypatch.setattr(measuring, "measure_each", lying)
     (check,) = check_coal(ball_near_link_4(0.01), STRAIGHT)
@@ -226,10 +221,10 @@ def test_a_lie_leaves_the_whole_undecided(monkeypatch: pytest.MonkeyPatch) -> No
     problem, drawn = ball_near_link_4(0.01), replace(STRAIGHT, on_path=np.ones(2))
     honest = measuring.measure_each
 
-    def lying(*arguments: object) -> Measured:
+    def lying(*arguments: object) -> FloatArray:
         found = honest(*arguments)
-        near = (found.distance > 0.0) & (found.distance < 0.011)
-        return Measured(found.distance + 1e-4 * near, found.near, found.far)
+        near = (found > 0.0) & (found < 0.011)
+        return found + 1e-4 * near
 
     for tell, verdict in ((honest, Verdict.CERTIFIED), (lying, Verdict.UNDECIDED)):
         monkeypatch.setattr(measuring, "measure_each", tell)
@@ -258,9 +253,9 @@ def test_no_answer_is_no_agreement(
 def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = measuring.measure_each
 
-    def flipped(*arguments: object) -> Measured:
+    def flipped(*arguments: object) -> FloatArray:
         found = honest(*arguments)
-        return Measured(-found.distance, found.near, found.far)
+        return -found
 
     monkeypatch.setattr(measuring, "measure_each", flipped)
     for gap in (0.01, -0.01):

@@ -6,6 +6,7 @@ import pytest
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
@@ -16,7 +17,6 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.coal_arm import CoalArm
-from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_check import check_coal
 from vdsm_pin.verification.records import Verdict
 
@@ -98,10 +98,10 @@ def test_a_wrong_distance_is_noticed(
 ) -> None:
     honest = measuring.measure_each
 
-    def lying(*arguments: object) -> Measured:
+    def lying(*arguments: object) -> FloatArray:
         found = honest(*arguments)
         error = sign * excess * TOLERANCES.coal_agreement
-        return Measured(found.distance + error, found.near, found.far)
+        return found + error
 
     monkeypatch.setattr(measuring, "measure_each", lying)
     arm = built_in("hrm8")

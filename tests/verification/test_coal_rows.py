@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.verification.coal_rows import CoalIndex, CoalRows
+from vdsm_pin.verification.brackets import CoalIndex, CoalRows
 
 
 def test_of_each_key_the_least_distance_is_found() -> None:

@@ -12,8 +12,7 @@ from typing import Final
 from vdsm_pin import kept
 from vdsm_pin.compiled import plain_numba
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.report.browser import find_browser
-from vdsm_pin.report.film import find_encoder
+from vdsm_pin.report.film import find_browser, find_encoder
 from vdsm_pin.report.run_record import machine, versions
 
 USES: Final = {

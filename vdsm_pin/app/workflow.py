@@ -24,9 +24,9 @@ from vdsm_pin.io.source import (
 from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.progress import step
-from vdsm_pin.report.browser import find_browser, print_page
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
+from vdsm_pin.report.film import find_browser, print_page
 from vdsm_pin.report.folder import (
     CERTIFICATES,
     check_ending,

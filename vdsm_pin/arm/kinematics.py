@@ -1,9 +1,11 @@
 """Closed-form kinematics of the arm (Eq. 1-3, 11-15), row by row of a motion.
 
 In its parent frame a link points along (cos a cos t, sin a cos t, -sin t). Link frames
-are R_i = R_{i-1} Rz(alpha_i) Ry(theta_i) and O_{i+1} = O_i + L_i R_i e_x.
+are R_i = R_{i-1} Rz(alpha_i) Ry(theta_i) and O_{i+1} = O_i + L_i R_i e_x. As a tree of
+joints the arm is the rail, then yaw and pitch of every link.
 """
 
+from functools import lru_cache
 from typing import Final, NoReturn
 
 import numpy as np
@@ -12,6 +14,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import WrongLinkLength
 from vdsm_pin.geometry.arrays import FloatArray, read_only
 from vdsm_pin.geometry.joint_kernels import centres_of, turns_of
+from vdsm_pin.proof.tree import Joint, Kind, Tree, X, Y, Z, shifted
 from vdsm_pin.tolerances import TOLERANCES
 
 CHUNK: Final = 1024
@@ -165,3 +168,32 @@ def link_angles(alpha: FloatArray, theta: FloatArray) -> FloatArray:
 def position_angles(alpha: FloatArray, theta: FloatArray) -> FloatArray:
     """gamma_i in (-pi, pi], same shape; [rad] (Eq. 3 with its quadrant kept)."""
     return np.asarray(np.arctan2(-np.sin(theta), np.cos(theta) * np.sin(alpha)))
+
+
+RAIL: int = 0
+"""The joint that carries the base: its placement is where the base stands."""
+
+
+def arm_tree(arm: Manipulator) -> Tree:
+    """The arm's joints; q = (x0, alpha1, theta1, ..), as `Trajectory.joints`."""
+    return _tree_of(tuple(map(float, arm.link_lengths)))
+
+
+@lru_cache(maxsize=64)
+def _tree_of(lengths: tuple[float, ...]) -> Tree:
+    """The tree of an arm whose links have these lengths; [m]."""
+    joints = [Joint(0, Kind.PRISMATIC, X, column=0, name="x0")]
+    before = 0.0
+    for link, length in enumerate(lengths):
+        at, placed = 2 * link + 1, shifted(before, 0.0, 0.0)
+        joints += [
+            Joint(at, Kind.REVOLUTE, Z, placed, column=at, name=f"alpha{link + 1}"),
+            Joint(at + 1, Kind.REVOLUTE, Y, column=at + 1, name=f"theta{link + 1}"),
+        ]
+        before = length
+    return Tree(tuple(joints))
+
+
+def link_frame(link: int) -> int:
+    """The frame of a link, 1 to N: its origin at O_i, x along the link."""
+    return 2 * link + 1

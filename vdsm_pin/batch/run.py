@@ -14,8 +14,14 @@ from typing import Final
 from pydantic import ValidationError
 
 from vdsm_pin.app.workflow import NO_PLAN, REPORT
-from vdsm_pin.batch.folders import MAX_BYTES, folder_names, jobs_by_name, write_manifest
-from vdsm_pin.batch.inputs import expanded, motions
+from vdsm_pin.batch.folders import (
+    MAX_BYTES,
+    expanded,
+    folder_names,
+    jobs_by_name,
+    motions,
+    write_manifest,
+)
 from vdsm_pin.batch.pool import Ended, run_tasks
 from vdsm_pin.batch.progress import progress
 from vdsm_pin.batch.task import (
@@ -32,9 +38,9 @@ from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text, writing
 from vdsm_pin.io.source import read_text
 from vdsm_pin.planner.strategies import strategy
-from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.columns import COLUMNS, write_columns
 from vdsm_pin.report.files import BatchRow, TimingFile
+from vdsm_pin.report.film import find_browser
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text

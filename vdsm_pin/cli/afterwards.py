@@ -86,9 +86,12 @@ def simulate(
     simulation.html. Status 1 where the executed motion is not proved clear.
     """
     from vdsm_pin.app.problems import read_problem
-    from vdsm_pin.simulation.folder import SimulationOrder, simulate_to_folder
+    from vdsm_pin.simulation.folder import (
+        SimulationOrder,
+        show_simulation,
+        simulate_to_folder,
+    )
     from vdsm_pin.simulation.settings import Settings, read_settings
-    from vdsm_pin.simulation.terminal import show_simulation
 
     assumed = Settings() if settings is None else read_settings(settings)
     asked = read_problem(problem)

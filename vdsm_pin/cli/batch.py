@@ -85,7 +85,7 @@ def batch(
     """
     import json
 
-    from vdsm_pin.batch.inputs import passed_over
+    from vdsm_pin.batch.folders import passed_over
     from vdsm_pin.batch.run import Batch, Interrupted, run_batch
     from vdsm_pin.batch.task import Settings
     from vdsm_pin.kept import COLD_LIMIT, default_limit

@@ -11,10 +11,9 @@ from vdsm_pin.arm.manipulator import BUILT_IN, FEED, TOOL, Manipulator, built_in
 from vdsm_pin.arm.mounted import BodySolid, Feed, LinkBody, Tool
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import arm_schema as schema
-from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.frames import Frame, Reading, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.problem_errors import Gathered
-from vdsm_pin.io.reading import Reading
 from vdsm_pin.io.urdf_arm import read_urdf_arm
 from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.tolerances import TOLERANCES

@@ -15,12 +15,10 @@ from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
 from vdsm_pin.io.clouds import RawCloud, read_cloud
-from vdsm_pin.io.frames import Frame
-from vdsm_pin.io.mesh_file import read_mesh
-from vdsm_pin.io.mesh_size import MeshSize
+from vdsm_pin.io.frames import Frame, Reading
+from vdsm_pin.io.mesh_file import MeshSize, read_mesh
 from vdsm_pin.io.motion_field import FLOATING, MotionModel, MovableModel
 from vdsm_pin.io.problem_errors import Gathered
-from vdsm_pin.io.reading import Reading
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.problem import scene

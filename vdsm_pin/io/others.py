@@ -14,8 +14,8 @@ from typing import Final, NamedTuple, TypeAlias
 
 from numpy import eye
 
+from vdsm_pin.arm.kinematics import RAIL, arm_tree, link_frame
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.arm.tree import RAIL, arm_tree, link_frame
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.io.arm_builder import ArmBuilder
@@ -23,8 +23,7 @@ from vdsm_pin.io.arm_schema import ManipulatorModel, UrdfManipulatorModel
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.problem_errors import Gathered
-from vdsm_pin.io.problem_schema import OtherModel
-from vdsm_pin.io.robot_schema import RobotModel
+from vdsm_pin.io.problem_schema import OtherModel, RobotModel
 from vdsm_pin.io.source import check_is_file_or_bag, read_bytes
 from vdsm_pin.io.tables import as_text
 from vdsm_pin.io.trajectory_file import read_trajectory_text

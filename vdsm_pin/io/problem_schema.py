@@ -2,22 +2,22 @@
 
 This is the contract with users and the source of the JSON Schema for editors. Lengths
 are in the file's `length_unit`, angles in degrees; `problem_builder.py` converts.
+A robot is named by its URDF and what is said of it.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 
 from vdsm_pin.arm.manipulator import MAX_LINKS
 from vdsm_pin.geometry.arrays import rotation_from_rpy
-from vdsm_pin.io.arm_schema import ManipulatorField
+from vdsm_pin.io.arm_schema import MAX_PARTS, ManipulatorField
 from vdsm_pin.io.errors_field import ErrorsModel
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.motion_field import MovableModel
 from vdsm_pin.io.path_schema import TipPathModel
 from vdsm_pin.io.posture_field import GoalModel, Start
-from vdsm_pin.io.robot_schema import RobotModel
 from vdsm_pin.io.schema_types import (
     FileModel,
     FileName,
@@ -28,6 +28,41 @@ from vdsm_pin.io.schema_types import (
     Range,
     Vector,
 )
+
+CoverKind: TypeAlias = Literal["hull", "parts", "primitives"]
+
+
+class RobotModel(FileModel):
+    """A robot by its URDF."""
+
+    urdf: str = Field(description="File, relative to this one.")
+    srdf: str | None = Field(
+        default=None,
+        description="File with the pairs of links that are not held apart. Default: "
+        "links joined by one joint are not.",
+    )
+    package_dirs: list[str] = Field(
+        default=[], description="Folders where package:// is looked for."
+    )
+    lock: dict[str, Number] = Field(
+        default={}, description="Joints that stand still, in the URDF's units [rad, m]."
+    )
+    group: str | None = Field(
+        default=None,
+        description="Group of the SRDF whose joints a trajectory moves; the others "
+        "stand where lock says, or at 0. Default: all move that are not locked.",
+    )
+    bodies: CoverKind | None = Field(
+        default=None,
+        description="What stands for the mesh of a link: its hull, hulls of parts of "
+        "it, or a ball, capsule or box around it (primitives). Default: hull.",
+    )
+    parts: int | None = Field(
+        default=None, ge=1, le=MAX_PARTS, description="Hulls of one mesh, with parts."
+    )
+    joint_limits: str | None = Field(
+        default=None, description="A joint_limits.yaml of MoveIt; the stricter counts."
+    )
 
 
 def not_bool(value: Any) -> Any:

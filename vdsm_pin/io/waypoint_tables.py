@@ -18,7 +18,7 @@ from vdsm_pin.errors import InconsistentCables, InvalidFile, WrongLinkLength
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import check_is_file, readable
 from vdsm_pin.io.tables import Table, open_text
-from vdsm_pin.io.waypoint_rows import LENGTH, PLACE, WAYPOINT, read_waypoints
+from vdsm_pin.io.trajectory_file import LENGTH, PLACE, WAYPOINT, read_waypoints
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES

@@ -1,9 +1,9 @@
-"""What a problem of a snake arm and one of any other robot have in common."""
+"""What problems and motions of snake arms and of any other robot have in common."""
 
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Self
+from typing import Protocol, Self
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, is_rigid
@@ -122,3 +122,18 @@ class AnyProblem(Summarised):
         same = replace(self)  # type: ignore[type-var]
         object.__setattr__(same, "source", source)
         return same
+
+
+class AnyMotion(Protocol):
+    """A motion of a snake arm or of any other robot: rows of joint values."""
+
+    @property
+    def n_samples(self) -> int:
+        """Number of rows."""
+
+    @property
+    def times(self) -> FloatArray | None:
+        """Times of the rows, shape (n_samples,); None where not known; [s]."""
+
+    def times_at(self, moments: FloatArray) -> FloatArray | None:
+        """Times of moments in waypoints, shape (m,); None where not known; [s]."""

@@ -1,4 +1,4 @@
-"""Bodies that ride on frames, and which of them are held apart."""
+"""Bodies that ride on frames, which are held apart, and how far they may stray."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -123,3 +123,21 @@ class PairTable:
     def size(self) -> int:
         """Number of pairs."""
         return len(self.one if self.rough is None else self.rough)
+
+
+@dataclass(frozen=True)
+class ErrorBox:
+    """The largest errors, each from none to that, in whatever direction, at every time.
+
+    Args:
+        joints: Of each joint's value, shape (n_joints,); [rad] or [m].
+        shifts: Of the origin of each joint's placement, shape (n_joints,); [m].
+        tilts: Turn of each placement about its origin, shape (n_joints,); [rad].
+        surfaces: By how much the surface of each body may be off, shape (n_bodies,);
+            [m]. None for not at all.
+    """
+
+    joints: FloatArray
+    shifts: FloatArray
+    tilts: FloatArray
+    surfaces: FloatArray | None = None

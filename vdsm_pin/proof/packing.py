@@ -6,8 +6,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
-from vdsm_pin.proof.bodies import Body, PairTable
-from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.bodies import Body, ErrorBox, PairTable
 from vdsm_pin.proof.moving_sides import moving_sides
 from vdsm_pin.proof.packed_tree import pack_tree, strokes
 from vdsm_pin.proof.terms import ACROSS, WITHIN, Pairs, Rules, Task

@@ -21,9 +21,9 @@ from vdsm_pin.report.drawing import (
     obstacle_data,
     row_data,
     solid_data,
+    subdivided,
 )
 from vdsm_pin.report.motion_facts import changed_angles
-from vdsm_pin.report.moves import subdivided
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import FINE, surface
 from vdsm_pin.report.thinning import Thinned, thinned

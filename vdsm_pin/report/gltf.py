@@ -12,8 +12,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.scene import Moving, solid_of
-from vdsm_pin.report.drawing import Drawing
-from vdsm_pin.report.moves import quaternion, told_moments
+from vdsm_pin.report.drawing import Drawing, quaternion, told_moments
 from vdsm_pin.report.palette import OBSTACLE_EDGE, PATH
 from vdsm_pin.report.solids import Surface, detail, surface
 

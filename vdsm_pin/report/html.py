@@ -18,12 +18,11 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.files import BatchRow, PlanFile, VerificationFile
 from vdsm_pin.report.impasse import impasse_of
-from vdsm_pin.report.inputs import assumption
+from vdsm_pin.report.inputs import assumption, scene_rows, scene_words
 from vdsm_pin.report.page_data import impasse_data, report_data, view_data
 from vdsm_pin.report.reason import failing, left_out_words, nearest_to_obstacle
 from vdsm_pin.report.rows import Point
 from vdsm_pin.report.run_record import RunRecord, machine, versions
-from vdsm_pin.report.scene_rows import scene_rows, scene_words
 from vdsm_pin.report.thinning import MOST_DRAWN
 from vdsm_pin.report.words import (
     MISSING,

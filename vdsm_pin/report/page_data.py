@@ -13,12 +13,28 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.charts import clearance_charts
 from vdsm_pin.report.drawing import Drawing
-from vdsm_pin.report.drawings import drawing_of
 from vdsm_pin.report.impasse import Impasse
 from vdsm_pin.report.reason import failing
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles, thinned
 from vdsm_pin.report.words import finite
-from vdsm_pin.verification.records import ClosestApproach, Counterexample, Verification
+from vdsm_pin.verification.records import (
+    ArmVerification,
+    ClosestApproach,
+    Counterexample,
+    Verification,
+)
+
+
+def drawing_of(verification: Verification) -> Drawing:
+    """How a motion that was judged is drawn."""
+    if isinstance(verification, ArmVerification):
+        return ArmDrawing(verification.problem, verification.trajectory)
+    # Whoever draws an arm needs no robots.
+    from vdsm_pin.report.robot_drawing import RobotDrawing
+    from vdsm_pin.robots.judgement import RobotVerification
+
+    assert isinstance(verification, RobotVerification)
+    return RobotDrawing(verification.problem, verification.trajectory)
 
 
 def closest_data(

@@ -8,9 +8,9 @@ from shapely import MultiPoint, Polygon
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.problem.scene import solid_of
-from vdsm_pin.report.drawings import drawing_of
+from vdsm_pin.report.drawing import start_pose
 from vdsm_pin.report.html import rendered
-from vdsm_pin.report.moves import start_pose
+from vdsm_pin.report.page_data import drawing_of
 from vdsm_pin.report.palette import OBSTACLE, OBSTACLE_EDGE, PATH, link_colours
 from vdsm_pin.report.solids import surface
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles

@@ -16,8 +16,14 @@ from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.charts import packed, series
-from vdsm_pin.report.drawing import Part, Silhouette, obstacle_data, row_data
-from vdsm_pin.report.moves import quaternion, subdivided
+from vdsm_pin.report.drawing import (
+    Part,
+    Silhouette,
+    obstacle_data,
+    quaternion,
+    row_data,
+    subdivided,
+)
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import Surface, joined, piece_surface
 from vdsm_pin.report.thinning import Thinned, thinned

@@ -18,14 +18,18 @@ from vdsm_pin.arm.kinematics import joint_centres, link_angles, position_angles
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.decimals import LONGEST, WORD, put_rows
 from vdsm_pin.io.tables import quoted
-from vdsm_pin.io.waypoint_rows import PLACE, WAYPOINT
+from vdsm_pin.io.trajectory_file import PLACE, WAYPOINT
 from vdsm_pin.io.waypoint_tables import cable_columns, centre_columns
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.verification.brackets import ClearanceChunk, LeastClearances
-from vdsm_pin.verification.coal_rows import NOTHING_MEASURED, CoalIndex
+from vdsm_pin.verification.brackets import (
+    NOTHING_MEASURED,
+    ClearanceChunk,
+    CoalIndex,
+    LeastClearances,
+)
 from vdsm_pin.verification.records import ArmVerification, Pair, Verification
 
 

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.problem.any_problem import AnyMotion
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.protocols import AnyMotion
 from vdsm_pin.verification.records import Verification
 
 MOST_ROWS: Final = 2_000

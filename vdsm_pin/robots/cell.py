@@ -23,8 +23,7 @@ from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.assembly import Assembly, obstacle_growth
-from vdsm_pin.verification.coal_pairs import assembly_shapes
-from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides, assembly_shapes
 
 
 def check_errors(robot: Robot, scene: Scene, errors: ErrorBox) -> None:
@@ -171,7 +170,7 @@ class Cell(AnyProblem):
             row: As for `sides`.
         """
         sides = self.sides(one, other, row)
-        return self.coal.distances(poses[:, :, :3], sides).distance
+        return self.coal.distances(poses[:, :, :3], sides)
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Robot, scene and what is required."""

@@ -13,15 +13,14 @@ from typing import Final, NamedTuple, TypeAlias, get_args
 from pydantic import Field
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.body_schema import MAX_PARTS
+from vdsm_pin.io.arm_schema import MAX_PARTS
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import OtherReader, ReadRobot
 from vdsm_pin.io.problem_builder import joined
 from vdsm_pin.io.problem_errors import Gathered, checked
 from vdsm_pin.io.problem_file import files_of_obstacles
-from vdsm_pin.io.problem_schema import AnyProblemModel
-from vdsm_pin.io.robot_schema import CoverKind, RobotModel
+from vdsm_pin.io.problem_schema import AnyProblemModel, CoverKind, RobotModel
 from vdsm_pin.io.source import path_of, read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.any_problem import ProblemSource

@@ -9,19 +9,18 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
-from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.proving import Budget
 from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.asked_motion import AskedMotion
-from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
 from vdsm_pin.verification.clearance_check import LINKS
 from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_shapes import Sides, disagreement
 from vdsm_pin.verification.inside import located
-from vdsm_pin.verification.judgement import judge_clearance
+from vdsm_pin.verification.judgement import BestEffort, judge_clearance
 from vdsm_pin.verification.limits import checks_of_others
 from vdsm_pin.verification.records import Check, Verdict, Verification
 
@@ -125,7 +124,7 @@ def _coal(
     listed[told] = True
     close = (lower < table.required[seen] + NEAR) | np.isnan(low) | listed[seen]
     near = Sides(*(side[close] for side in sides))
-    found[seen[close]] = cell.coal.distances(poses[:, :, :3], near).distance
+    found[seen[close]] = cell.coal.distances(poses[:, :, :3], near)
     off = disagreement(found[seen], lower, upper)
     off[~close] = np.maximum(low - upper, lower - high)[~close]
     evidence = CoalEvidence(count=int((~np.isnan(found)).sum()))

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+import typer
 from pydantic import Field
 
 from vdsm_pin.errors import InvalidInput
@@ -16,15 +17,16 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.rows import FileModel, VerdictWord
 from vdsm_pin.report.run_record import versions
-from vdsm_pin.report.words import finite
+from vdsm_pin.report.terminal import show_facts
+from vdsm_pin.report.words import at_least, finite, measured, outcome, percent
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
 from vdsm_pin.simulation.page import BAND_DEG, page
 from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
-from vdsm_pin.verification.best_effort import BestEffort
+from vdsm_pin.text import printable
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.inside import located
-from vdsm_pin.verification.judgement import judge_clearance
+from vdsm_pin.verification.judgement import BestEffort, judge_clearance
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import combine
 
@@ -213,3 +215,23 @@ def _write_record(path: Path, found: Simulation) -> None:
     )
     lines = (",".join(map(repr, row)) for row in table.tolist())
     path.write_text("\n".join([",".join(names), *lines]) + "\n", encoding="utf-8")
+
+
+def show_simulation(file: SimulationFile, folder: Path) -> None:
+    """One simulation in a few lines."""
+    known = outcome(file.executed.verdict)
+    typer.echo(f"{known.mark} {known.word}  {printable(file.problem)}, executed motion")
+    show_facts(
+        ("duration", f"{file.duration_s:.1f} s"),
+        ("clearance planned", at_least(file.planned.min_clearance_m)),
+        ("clearance executed", at_least(file.executed.min_clearance_m)),
+        ("largest joint error", measured(file.largest_error_rad, "rad")),
+        ("largest base error", measured(file.largest_base_error_m, "m")),
+        ("any motion within these errors", file.within_error_box.verdict),
+        ("joints within ±0.3°", percent(file.within_band_share)),
+        ("largest tension", f"{file.largest_tension_n:.0f} N"),
+        ("slack", f"{percent(file.slack_share)} of all cables and times"),
+        ("least joint stiffness", f"{file.least_stiffness_nm_rad:.1f} Nm/rad"),
+        ("tension margin", f"{file.least_tension_margin_n:.0f} N in every cable"),
+        ("files in", str(folder)),
+    )

@@ -13,7 +13,7 @@ from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.problem.error_boxes import NO_ERRORS, ErrorBox
 from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
 from vdsm_pin.proof.bodies import Body, PairTable
-from vdsm_pin.proof.error_box import ErrorBox as ProofBox
+from vdsm_pin.proof.bodies import ErrorBox as ProofBox
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.tree import Tree

@@ -1,10 +1,16 @@
-"""Brackets of clearances: by interval, least over a motion, and along it for a plot."""
+"""Clearances as data.
+
+Brackets by interval, the least of a motion, those along it for a plot; and Coal's
+distances: which pair, at which waypoint, how far apart.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 
 
 @dataclass(frozen=True)
@@ -99,3 +105,52 @@ class ClearanceProfile:
     obstacle_lower: FloatArray
     obstacle_upper: FloatArray
     first_interval: IntArray
+
+
+@dataclass(frozen=True)
+class CoalRows:
+    """What Coal measured at the waypoints.
+
+    Args:
+        waypoint: Row of the trajectory, from 0, shape (m,).
+        pair: Number of the pair, as in `Verification.pairs`, shape (m,).
+        distance: By Coal; NaN where its answer is unusable, shape (m,); [m].
+    """
+
+    waypoint: IntArray
+    pair: IntArray
+    distance: FloatArray
+
+
+NOTHING_MEASURED: Final = CoalRows(
+    frozen([], np.int64), frozen([], np.int64), frozen([])
+)
+"""What a Coal that was not asked measured."""
+
+
+class CoalIndex:
+    """Finds Coal's distance by a key; of several with one key the least.
+
+    Args:
+        rows: What was measured.
+        keys: Key of each, shape (m,).
+    """
+
+    def __init__(self, rows: CoalRows, keys: IntArray) -> None:
+        order = np.lexsort((rows.distance, keys))
+        self._keys = keys[order]
+        found = np.column_stack([rows.waypoint, rows.distance])[order]
+        self._found = np.vstack([found, [np.nan, np.nan]])
+
+    def at(self, keys: IntArray) -> FloatArray:
+        """Waypoint and distance for some keys, NaN where nothing was measured.
+
+        Args:
+            keys: Shape (k,).
+
+        Returns:
+            Shape (k, 2); waypoints, and [m].
+        """
+        place = np.searchsorted(self._keys, keys)
+        known = np.append(self._keys, -1)[place] == keys
+        return np.asarray(self._found[np.where(known, place, -1)])

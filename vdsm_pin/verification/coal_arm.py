@@ -15,8 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.tree import link_frame
+from vdsm_pin.arm.kinematics import joint_centres, link_frame
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.geometry.row_bounds import coarse_bounds, link_gaps, row_brackets
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -24,8 +23,12 @@ from vdsm_pin.problem.scene import Moving
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.coal_pairs import CoalPairs, assembly_shapes
-from vdsm_pin.verification.coal_shapes import Sides, disagreement
+from vdsm_pin.verification.coal_shapes import (
+    CoalPairs,
+    Sides,
+    assembly_shapes,
+    disagreement,
+)
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.task import arm_assembly
 
@@ -53,9 +56,6 @@ class CoalDistances:
         lower: Our lower bound then, -inf where we have none, shape (m,); [m].
         upper: Our upper bound, inf where we have none; the lower one where there is a
             closed form, shape (m,); [m].
-        own_point: Coal's witness on the first body, in the frame of the second, (m, 3);
-            [m].
-        other_point: Coal's witness on the second body, the same; [m].
     """
 
     moment: FloatArray
@@ -63,8 +63,6 @@ class CoalDistances:
     distance: FloatArray
     lower: FloatArray
     upper: FloatArray
-    own_point: FloatArray
-    other_point: FloatArray
 
     @property
     def disagreement(self) -> FloatArray:
@@ -191,9 +189,7 @@ class CoalArm:
         lower, upper = self._brackets(
             self._axes(*now), Sides(place, one, self._column[pair])
         )
-        return CoalDistances(
-            moments, pair, found.distance, lower, upper, found.near, found.far
-        )
+        return CoalDistances(moments, pair, found, lower, upper)
 
     def _near(
         self, trajectory: Trajectory, room: float, travel: float, deadline: Deadline

@@ -9,12 +9,12 @@ to its skin, so that the sign of a body in a mesh has to come from elsewhere.
 
 import math
 from collections.abc import Iterable
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.solids import (
@@ -36,27 +36,6 @@ from vdsm_pin.verification.coal_hulls import CoalBody, coal_parts, placed, swept
 
 GROUP: Final = 64
 """Bodies of a cloud that share a ball around them."""
-
-
-class Measured(NamedTuple):
-    """What Coal says about two bodies.
-
-    Args:
-        distance: Positive apart; where they meet only the sign is meant; -inf where
-            Coal gives no usable answer; [m].
-        near: Witness on the first body, base frame, shape (3,); [m].
-        far: Witness on the second, base frame, shape (3,); [m].
-    """
-
-    distance: Any
-    near: FloatArray
-    far: FloatArray
-
-
-NOTHING: Final = Measured(
-    float("inf"), frozen(np.full(3, np.nan)), frozen(np.full(3, np.nan))
-)
-"""The distance to no body at all."""
 
 
 class CoalCloud:
@@ -84,22 +63,21 @@ class CoalCloud:
         self._each = reach
         self._reach = np.linalg.norm(high - self._middle, axis=1) + reach
 
-    def measured(self, request: Any, geometry: Any, pose: Any) -> Measured:
-        """What Coal says of the nearest body; arguments are those of `measure`."""
+    def measure(self, request: Any, result: Any, geometry: Any, pose: Any) -> float:
+        """The distance of the nearest body; arguments are those of `_answer`; [m]."""
         geometry.computeLocalAABB()
-        box, best = geometry.aabb_local, NOTHING
+        box, best = geometry.aabb_local, math.inf
         bounds = _gaps(box, pose, self._middle) - self._reach
         for k in np.argsort(bounds):
-            if bounds[k] > max(best.distance, 0.0):
+            if bounds[k] > max(best, 0.0):
                 break  # where they meet the sign is known
             group = self._centres[k * GROUP : (k + 1) * GROUP]
             each = _gaps(box, pose, group) - self._each
             for i in np.argsort(each):
-                if each[i] > max(best.distance, 0.0):
+                if each[i] > max(best, 0.0):
                     break
                 body = placed(self._shape, group[i], self._rotation)
-                found = _nearest(request, geometry, pose, (body,))
-                best = min(best, found, key=lambda one: one.distance)
+                best = min(best, _answer(request, result, geometry, pose, body))
         return best
 
 
@@ -202,47 +180,47 @@ def distance_request() -> Any:
     return request
 
 
-def measure(request: Any, geometry: Any, pose: Any, bodies: CoalObstacle) -> Measured:
-    """Distance between one body and the nearest part of an obstacle.
+def measure(
+    request: Any, geometry: Any, pose: Any, bodies: CoalObstacle, result: Any = None
+) -> float:
+    """Distance between one body and the nearest part of an obstacle; [m].
 
     Args:
         request: From `distance_request`.
         geometry: A coal.CollisionGeometry.
         pose: Its coal.Transform3s.
         bodies: The obstacle.
+        result: A coal.DistanceResult to use again: a new one costs as much as a
+            distance.
 
     Returns:
-        The nearest part's answer; one unusable answer makes the whole unusable.
+        Positive apart; where they meet only the sign is meant. One unusable answer
+        makes the whole unusable: -inf.
     """
-    if isinstance(bodies, CoalCloud):
-        return bodies.measured(request, geometry, pose)
-    return _nearest(request, geometry, pose, bodies)
-
-
-def _nearest(
-    request: Any, geometry: Any, pose: Any, bodies: Iterable[CoalBody]
-) -> Measured:
     import coal
 
-    best, result = NOTHING, coal.DistanceResult()
-    for body in bodies:
-        result.clear()
-        distance = coal.distance(
-            geometry, pose, body.geometry, body.pose, request, result
-        )
-        near, far = result.getNearestPoint1(), result.getNearestPoint2()
-        gap = math.dist(near.tolist(), far.tolist())
-        if not _usable(distance, result.min_distance, gap):
-            return Measured(float("-inf"), near, far)
-        if distance < best.distance:
-            best = Measured(float(distance), near, far)
-    return best
+    result = coal.DistanceResult() if result is None else result
+    if isinstance(bodies, CoalCloud):
+        return bodies.measure(request, result, geometry, pose)
+    answers = (_answer(request, result, geometry, pose, body) for body in bodies)
+    return min(answers, default=math.inf)
 
 
-def _usable(distance: Any, stored: Any, gap: Any) -> Any:
+def _answer(
+    request: Any, result: Any, geometry: Any, pose: Any, body: CoalBody
+) -> float:
+    """Coal's distance of two bodies; -inf where its answer is not usable; [m]."""
+    import coal
+
+    result.clear()
+    distance = coal.distance(geometry, pose, body.geometry, body.pose, request, result)
+    near, far = result.getNearestPoint1(), result.getNearestPoint2()
+    gap = math.dist(near.tolist(), far.tolist())
+    return float(distance) if _usable(distance, result.min_distance, gap) else -math.inf
+
+
+def _usable(distance: float, stored: float, gap: float) -> bool:
     """Whether an answer is one: a number, no sentinel, and borne out by its witness.
-
-    Of numbers or arrays of them.
 
     Args:
         distance: As Coal returns it; [m].
@@ -250,8 +228,8 @@ def _usable(distance: Any, stored: Any, gap: Any) -> Any:
         gap: Between its witnesses; [m].
     """
     borne_out = abs(gap - distance) <= TOLERANCES.coal_agreement
-    number = (distance == stored) & (abs(distance) < LARGEST)
-    return number & (borne_out | (distance <= 0.0))
+    number = distance == stored and abs(distance) < LARGEST
+    return bool(number and (borne_out or distance <= 0.0))
 
 
 Call: TypeAlias = tuple[int, Any, FloatArray, FloatArray, CoalObstacle | None]
@@ -259,76 +237,20 @@ Call: TypeAlias = tuple[int, Any, FloatArray, FloatArray, CoalObstacle | None]
 is measured from; None for one that Coal cannot take."""
 
 
-def measure_each(calls: Iterable[Call], count: int) -> Measured:
-    """`measure` of many pairs, each the nearest of its calls; NaN for one without any.
+def measure_each(calls: Iterable[Call], count: int) -> FloatArray:
+    """`measure` of many pairs, each the nearest of its calls, shape (count,); [m].
 
     Args:
-        calls: In the order of their pairs.
-        count: Number of pairs.
-
-    Returns:
-        Arrays of what it has of one pair.
+        calls: What is asked.
+        count: Number of pairs; NaN is told of one without any call.
     """
     import coal
 
-    request, result, pose = (
-        distance_request(),
-        coal.DistanceResult(),
-        coal.Transform3s(),
-    )
-    pairs, told, stored = list[int](), list[float](), list[float]()
-    near, far = list[FloatArray](), list[FloatArray]()
+    request, result = distance_request(), coal.DistanceResult()
+    found, pose = np.full(count, np.nan), coal.Transform3s()
     for pair, shape, turn, shift, bodies in calls:
         pose.setTransform(turn, shift)
-        if isinstance(bodies, CoalCloud):
-            found = measure(request, shape, pose, bodies)
-            pairs.append(pair)
-            told.append(found.distance)
-            stored.append(found.distance)
-            near.append(found.near)
-            far.append(found.far)
-            continue
-        for body in bodies or ():
-            result.clear()  # a new one costs as much as a distance
-            asked = shape, pose, body.geometry, body.pose, request, result
-            pairs.append(pair)
-            told.append(coal.distance(*asked))
-            stored.append(result.min_distance)
-            near.append(result.getNearestPoint1())
-            far.append(result.getNearestPoint2())
-    columns = np.array(told), np.array(stored)
-    return _nearest_of_each(np.array(pairs, np.int64), columns, (near, far), count)
-
-
-def _nearest_of_each(
-    pair: IntArray,
-    distances: tuple[FloatArray, FloatArray],
-    points: tuple[list[FloatArray], list[FloatArray]],
-    count: int,
-) -> Measured:
-    """The nearest answer of each pair; one unusable one makes a pair's unusable.
-
-    Args:
-        pair: Of each answer, rising, shape (m,).
-        distances: As Coal returned and kept them, shape (m,); [m].
-        points: Witnesses.
-        count: Number of pairs.
-    """
-    found = Measured(np.full(count, np.nan), *np.full((2, count, 3), np.nan))
-    if not pair.size:
-        return found
-    near, far = (np.concatenate(side).reshape(-1, 3) for side in points)
-    gap = np.linalg.norm(near - far, axis=1)
-    distance = np.where(_usable(*distances, gap), distances[0], -np.inf)
-    if pair.size > count or not (np.diff(pair) > 0).all():
-        order = np.lexsort((distance, pair))
-        first = order[np.append(True, np.diff(pair[order]) > 0)]
-        pair, distance, near, far = (
-            pair[first],
-            distance[first],
-            near[first],
-            far[first],
-        )
-    for column, values in zip(found, (distance, near, far), strict=True):
-        column[pair] = values
+        if bodies:
+            told = measure(request, shape, pose, bodies, result)
+            found[pair] = np.fmin(found[pair], told)
     return found

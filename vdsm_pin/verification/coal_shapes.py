@@ -1,20 +1,28 @@
 """Coal's distances of bodies that ride on frames: of an arm, a robot, what moves.
 
+The bodies of an assembly as Coal has them, and its pairs seen from them.
+
 Whoever asks has the frames' poses, from Pinocchio where it can.
 """
 
-from collections.abc import Sequence
-from functools import cached_property
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from functools import cached_property, lru_cache
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.problem.scene import Obstacle
+from vdsm_pin.proof.bodies import Body
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.coal_bodies import (
     CoalCloud,
     CoalObstacle,
+    coal_obstacle,
     measure_each,
 )
+from vdsm_pin.verification.coal_hulls import CoalBody, coal_parts
 
 
 class Sides(NamedTuple):
@@ -29,20 +37,6 @@ class Sides(NamedTuple):
     row: IntArray
     one: IntArray
     other: IntArray
-
-
-class Distances(NamedTuple):
-    """What Coal says of some pairs.
-
-    Args:
-        distance: As `Measured` has it; NaN where Coal cannot take a shape, (m,); [m].
-        near: Witnesses on the first bodies, in the frames of the second, (m, 3); [m].
-        far: Witnesses on the second, in their own frames, shape (m, 3); [m].
-    """
-
-    distance: FloatArray
-    near: FloatArray
-    far: FloatArray
 
 
 def disagreement(
@@ -117,8 +111,8 @@ class CoalShapes:
         which = ", ".join(f"'{names[k]}'" for k in silent)
         return f"; none of {which}, whose shape Coal cannot take" if which else ""
 
-    def distances(self, poses: FloatArray, sides: Sides) -> Distances:
-        """Coal's distance of each pair.
+    def distances(self, poses: FloatArray, sides: Sides) -> FloatArray:
+        """Coal's distance of each pair, NaN where it tells none, (n_pairs,); [m].
 
         Args:
             poses: T_base_frame at some rows, shape (n_rows, n_frames, 3, 4); [m].
@@ -134,7 +128,7 @@ class CoalShapes:
         shapes = [self._parts.shapes[k] for k in part.tolist()]
         partners = [self._bodies[k] for k in sides.other[pair].tolist()]
         calls = zip(pair.tolist(), shapes, *places, partners, strict=True)
-        return Distances(*measure_each(calls, len(sides.row)))
+        return measure_each(calls, len(sides.row))
 
     def between_balls(
         self, poses: FloatArray, sides: Sides
@@ -179,3 +173,54 @@ class CoalShapes:
             turns = back @ turns
             shifts = (back @ (shifts - rest[..., 3])[..., None])[..., 0]
         return turns, shifts
+
+
+KEPT: Final = 8
+"""Robots whose shapes are kept for their next scene."""
+
+
+class CoalPairs:
+    """The pairs of an assembly; a body of its own comes first, the partner second.
+
+    Args:
+        asked: What is held apart.
+
+    Attributes:
+        names: Of its bodies, then of the obstacles.
+        n_own: How many of them are its own.
+        one: Number of the first body of each pair, one of its own, shape (n_pairs,).
+        other: Of the second, shape (n_pairs,).
+    """
+
+    def __init__(self, asked: Assembly) -> None:
+        own = [body.name for body in asked.own]
+        self.n_own, self.names = len(own), [*own, *asked.scene.names]
+        sides = asked.table.one, asked.table.other
+        self.one, self.other = np.where(asked.outer, sides[::-1], sides)
+
+    def named(self, pair: int) -> tuple[str, str]:
+        """The names of both bodies of a pair."""
+        return self.names[self.one[pair]], self.names[self.other[pair]]
+
+
+def assembly_shapes(asked: Assembly, deadline: Deadline = NO_LIMIT) -> CoalShapes:
+    """Coal's shapes of all bodies, on the frames of the tree.
+
+    Raises:
+        OutOfTime: If the time is over.
+        VerificationFailed: If Coal refuses a shape.
+    """
+
+    def shape(solid: Obstacle) -> CoalObstacle | None:
+        deadline.check()
+        return coal_obstacle(solid)
+
+    own = link_shapes(tuple(asked.own))
+    frames = [body.frame for body in asked.bodies]
+    return CoalShapes(frames, [*own, *map(shape, asked.scene.obstacles)])
+
+
+@lru_cache(maxsize=KEPT)
+def link_shapes(bodies: Iterable[Body]) -> tuple[tuple[CoalBody, ...] | None, ...]:
+    """Coal's shapes of bodies in their frames; None where it cannot take one."""
+    return tuple(coal_parts(body.pieces) for body in bodies)

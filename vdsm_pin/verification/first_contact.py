@@ -8,8 +8,8 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray
-from vdsm_pin.problem.any_problem import AnyProblem
-from vdsm_pin.proof.budget import Budget
+from vdsm_pin.problem.any_problem import AnyMotion, AnyProblem
+from vdsm_pin.proof.proving import Budget
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -17,7 +17,6 @@ from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.clearances import least_clearances, with_depths
 from vdsm_pin.verification.contacts import MEETING
-from vdsm_pin.verification.protocols import AnyMotion
 from vdsm_pin.verification.records import Pair
 
 STRETCH: Final = 64

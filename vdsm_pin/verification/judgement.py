@@ -1,18 +1,31 @@
-"""The clearances of a motion judged, of an arm's or a robot's, meshes as solids."""
+"""The clearances of a motion judged, of an arm's or a robot's, meshes as solids.
 
+Besides: the pairs that come nearest, and what becomes of a check that fails and of
+results for which no time is left.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Final
+from math import nan
+from typing import Final, ParamSpec, TypeVar
 
-from vdsm_pin.problem.any_problem import AnyProblem
+import numpy as np
+
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.errors import OutOfTime, VdsmError
+from vdsm_pin.geometry.arrays import BoolArray, IntArray
+from vdsm_pin.problem.any_problem import AnyMotion, AnyProblem
 from vdsm_pin.problem.error_boxes import NO_ERRORS
-from vdsm_pin.proof.budget import Budget
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.progress import step
+from vdsm_pin.proof.proving import Budget
 from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.approaches import nearest_pairs
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.assembly import Assembly
-from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
 from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.clearance_check import Evidence, clearance_checks
@@ -24,13 +37,72 @@ from vdsm_pin.verification.enclosed import (
 )
 from vdsm_pin.verification.first_contact import FirstContact, contacts_of
 from vdsm_pin.verification.inside import Places, check_inside, is_outside, located
-from vdsm_pin.verification.protocols import AnyMotion
 from vdsm_pin.verification.records import (
     Check,
     ClosestApproach,
     Counterexample,
+    Pair,
+    Verdict,
     is_deepest,
 )
+
+T = TypeVar("T")
+P = ParamSpec("P")
+
+
+class BestEffort:
+    """Results besides the checks, as far as the time allows them.
+
+    Attributes:
+        not_done: What the time did not allow, and why, one entry each.
+    """
+
+    def __init__(self) -> None:
+        self.not_done: list[str] = []
+
+    def take(
+        self,
+        name: str,
+        otherwise: T,
+        run: Callable[P, T],
+        *args: P.args,
+        **kw: P.kwargs,
+    ) -> T:
+        """What `run` returns, or `otherwise` and a note if it raises `OutOfTime`.
+
+        Args:
+            name: What is worked out, for the note and the progress bar.
+            otherwise: What stands for the result if the time is over.
+            run: Works it out.
+            args: What it is given.
+            kw: The same by name.
+        """
+        step("%s", name)
+        try:
+            return run(*args, **kw)
+        except OutOfTime as error:
+            self.not_done.append(f"{name}: {error}")
+            return otherwise
+
+    def note(self, name: str, deadline: Deadline) -> None:
+        """Note that the time did not allow a result."""
+        self.not_done.append(f"{name}: {OutOfTime(deadline.limit)}")
+
+
+def guarded(
+    name: str,
+    run: Callable[P, Check | tuple[Check, ...]],
+    *args: P.args,
+    **kw: P.kwargs,
+) -> tuple[Check, ...]:
+    """A check's rows; one undecided row if it raises a domain or arithmetic error."""
+    step("%s", name)
+    try:
+        rows = run(*args, **kw)
+    except (VdsmError, ArithmeticError) as error:
+        return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not done: {error}"),)
+    return rows if isinstance(rows, tuple) else (rows,)
+
 
 NOMINAL: Final = "proof of the motion without errors"
 
@@ -134,3 +206,79 @@ def _is_clear(motion: AskedMotion, deadline: Deadline) -> bool:
     """Whether a motion is proved clear of everything."""
     proof = motion.proof(Budget(until=deadline.end))
     return proof.is_certified and is_outside(located(motion, deadline))
+
+
+CLOSEST: Final = 10
+"""Most pairs that are listed."""
+
+
+def closest_approaches(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    nearest: Mapping[int, ClosestApproach],
+) -> dict[int, ClosestApproach]:
+    """The pairs that come nearest in a snake arm's motion, with places along links."""
+    return {
+        k: replace(near, station=_station(problem, trajectory, near))
+        for k, near in nearest.items()
+    }
+
+
+def nearest_pairs(
+    pairs: Sequence[Pair], outer: BoolArray, least: LeastClearances
+) -> dict[int, ClosestApproach]:
+    """The pairs of least upper bounds by their numbers, obstacles first.
+
+    Links keep near each other all the time, which is rarely news. The lower bound of
+    the nearest is narrowed; another may lie below it by the width of that bracket.
+    Under errors one that comes less near may be proved to keep less than any of these
+    from its obstacle; then it takes the place of the last.
+
+    Args:
+        pairs: Every pair, of an arm or a robot.
+        outer: Which of them are with an obstacle, shape (n_pairs,).
+        least: What is proved of them.
+    """
+    of_links, seen = ~outer, np.flatnonzero(np.isfinite(least.upper))
+
+    def nearest(some: IntArray) -> IntArray:
+        return some[np.lexsort((least.upper[some], of_links[some]))][:CLOSEST]
+
+    order = nearest(seen)
+    lower = np.where(of_links, np.inf, least.lower)[seen]
+    least_of_all = lower.min(initial=np.inf) + 2.0 * TOLERANCES.least_bracket
+    if order.size and (least.lower[order] > least_of_all).all():
+        weakest = seen[np.argmin(lower)]
+        order = nearest(np.append(order[: CLOSEST - 1], weakest))
+    return {
+        k: ClosestApproach(
+            interval=int(least.interval[k]),
+            share=float(least.share[k]),
+            pair=pairs[k],
+            lower=float(least.lower[k]),
+            upper=float(least.upper[k]),
+            station=nan,
+            link_point=least.link_point[k],
+            other_point=least.other_point[k],
+        )
+        for k in order.tolist()
+    }
+
+
+def _station(
+    problem: PlanningProblem, trajectory: Trajectory, near: ClosestApproach
+) -> float:
+    """Arc length along the link's axis of the point nearest to the witness; [m].
+
+    Of the feed, which lies along the rail, it counts back from O_1 and is negative.
+    """
+    arm, link = problem.manipulator, near.pair.link
+    joints = trajectory.path.at_moments(np.array([near.moment]))
+    if not link and arm.feed:
+        return float(np.clip(near.link_point[0] - joints[0, 0], -arm.feed.length, 0.0))
+    now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
+    centres = joint_centres(arm, *now)[0]
+    length = float(arm.link_lengths[link - 1])
+    axis = (centres[link] - centres[link - 1]) / length
+    along = float(axis @ (near.link_point - centres[link - 1]))
+    return min(max(along, 0.0), length)

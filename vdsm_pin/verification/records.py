@@ -9,15 +9,13 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.notebook import Summarised, in_percent
-from vdsm_pin.problem.any_problem import AnyProblem
+from vdsm_pin.problem.any_problem import AnyMotion, AnyProblem
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm, proved_mm
-from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
-from vdsm_pin.verification.coal_rows import CoalRows
-from vdsm_pin.verification.protocols import AnyMotion
+from vdsm_pin.verification.brackets import ClearanceProfile, CoalRows, LeastClearances
 
 
 class Verdict(StrEnum):

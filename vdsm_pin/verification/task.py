@@ -3,7 +3,7 @@
 import numpy as np
 
 from vdsm_pin.arm.bodies import BY_FILE
-from vdsm_pin.arm.tree import arm_tree, link_frame
+from vdsm_pin.arm.kinematics import arm_tree, link_frame
 from vdsm_pin.problem.held import held_pairs
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.bodies import Body, LeftOut, PairTable

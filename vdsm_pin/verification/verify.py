@@ -13,16 +13,20 @@ from vdsm_pin.geometry.winding import Side
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import with_hulls
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.proving import Budget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import cable_check, fk, pointing
-from vdsm_pin.verification.approaches import closest_approaches
 from vdsm_pin.verification.asked_motion import AskedMotion
-from vdsm_pin.verification.best_effort import BestEffort, guarded
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
 from vdsm_pin.verification.coal_arm import coal_reach
-from vdsm_pin.verification.coal_check import COAL, CoalLog, check_coal
+from vdsm_pin.verification.coal_check import (
+    COAL,
+    CoalLog,
+    LowersSink,
+    ProvedLowers,
+    check_coal,
+)
 from vdsm_pin.verification.enclosed import EnclosedSink, pairs_inside
 from vdsm_pin.verification.inside import (
     Places,
@@ -32,11 +36,15 @@ from vdsm_pin.verification.inside import (
     located_at_start,
     unlocated,
 )
-from vdsm_pin.verification.judgement import judge_clearance
+from vdsm_pin.verification.judgement import (
+    BestEffort,
+    closest_approaches,
+    guarded,
+    judge_clearance,
+)
 from vdsm_pin.verification.limits import check_limits, checks_of_others
 from vdsm_pin.verification.moving import check_timed
 from vdsm_pin.verification.pinocchio_arm import load_arm
-from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.tip import check_tip
