@@ -1,6 +1,7 @@
 """The numbers that the page of figures quotes, from certified plans."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any, Final
 
@@ -50,7 +51,7 @@ def run_facts(run: Run) -> dict[str, Any]:
         "moments": {mark.name: named(psi[mark.row]) for mark in marks(run)},
     }
     if to_obstacles:
-        facts["clearance"] = _round(min(to_obstacles) * MM_PER_M)
+        facts["clearance"] = _rounded_down(min(to_obstacles) * MM_PER_M)
     if run.scene in AXES:
         facts["axis_distance"] = _round(float(axis_distance(run).min()) * MM_PER_M)
     return facts
@@ -92,6 +93,10 @@ def read(file: Path) -> dict[str, Any]:
     """The numbers that were kept."""
     found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return found
+
+
+def _rounded_down(value: float) -> float:
+    return math.floor(value * 10.0**DIGITS) / 10.0**DIGITS
 
 
 def _round(value: float) -> float:

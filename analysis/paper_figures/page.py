@@ -9,6 +9,7 @@ from typing import Any, Final
 import table1_parameters
 
 from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.units import MM_PER_M, proved_mm
 
 TEMPLATE: Final = Path(__file__).with_name("page.md")
 """The words, with the places of the numbers."""
@@ -69,8 +70,8 @@ def _distance_table(facts: dict[str, Any]) -> str:
     for scene, by in facts.items():
         if "axis_distance" not in by["paper"]:
             continue
-        cells = [by[s]["axis_distance"] for s in ("paper", "fewest")]
-        cells += [by[s]["clearance"] for s in ("paper", "fewest")]
-        numbers = " | ".join(f"{cell:.1f} mm" for cell in cells)
-        lines.append(f"| {scene} | {numbers} |")
+        both = by["paper"], by["fewest"]
+        cells = [f"{one['axis_distance']:.1f} mm" for one in both]
+        cells += [proved_mm(one["clearance"] / MM_PER_M) for one in both]
+        lines.append(f"| {scene} | {' | '.join(cells)} |")
     return "\n".join(lines)

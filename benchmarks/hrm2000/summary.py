@@ -11,6 +11,7 @@ from benchmarks.hrm2000.attempt import Outcome
 from benchmarks.hrm2000.catalogue import FAMILIES, INFEASIBLE, has_witness
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY as OURS
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import proved_mm
 
 REFUSED: Final = ("infeasible", "not found", "out of time")
 
@@ -58,7 +59,7 @@ def _row(own: list[Outcome], limit: float) -> str:
         f"{np.percentile(times, 95):.2f}" if times else "-",
         _mean((o.knees for o in done), 2),
         max(most, default="-"),
-        f"{1e3 * min(room):.2f}" if room else "-",
+        proved_mm(min(room)).removesuffix(" mm") if room else "-",
         proved,
         sum(map(bad_plan, own)),
         sum(map(false_proof, own)) if has_witness(family) else "-",
