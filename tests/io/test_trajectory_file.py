@@ -10,10 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import vdsm_pin as vp
 from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import tables
-from vdsm_pin.io.trajectory_file import column_names, read_trajectory, write_trajectory
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import (
+    PLACE,
+    column_names,
+    read_trajectory,
+    write_trajectory,
+)
 from vdsm_pin.problem.trajectory import Trajectory
 
 HRM8 = built_in("hrm8")
@@ -45,6 +53,29 @@ def test_header_is_the_contract() -> None:
         "waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,alpha2_rad,theta2_rad"
     )
     assert column_names(8)[-2:] == ("alpha8_rad", "theta8_rad")
+
+
+def test_places_on_a_path_may_be_missing_where_there_is_none(tmp_path: Path) -> None:
+    """As docs/files.md says; a certificate of such a file is accepted."""
+    problem, rows, proof = (tmp_path / name for name in ("p.yaml", "t.csv", "proof"))
+    problem.write_text(
+        "vdsm_problem: 1\nlength_unit: m\nrequired_clearance: 0.01\nmanipulator: "
+        "{link_lengths: [1, 1], link_radius: 0.05, max_link_angle_deg: 40, "
+        "max_joint_angle_deg: 40}\nobstacles: [{name: b, shape: sphere, "
+        "center: [1, 1, 0], radius: 0.2}]\n"
+    )
+    names = ",".join(name for name in column_names(2) if name not in PLACE)
+    rows.write_text(f"{names}\n0,0.0,0.1,0.2,0.3,0.4\n1,0.5,-0.1,-0.2,-0.3,-0.4\n")
+    task = read_problem(problem)
+    found = vp.read_trajectory(rows, task)
+    np.testing.assert_array_equal(found.joints[1], [0.5, -0.1, -0.2, -0.3, -0.4])
+    assert not found.on_path.any() and not found.path_m.any()
+    vp.write_certificate(vp.verify(task, found), proof, rows)
+    with pytest.raises(SystemExit) as ended:
+        main(["check-certificate", str(proof), str(problem), str(rows)])
+    assert ended.value.code == 0
+    with pytest.raises(InvalidFile, match="has no column 'on_path'"):
+        read_trajectory(rows, task.manipulator)
 
 
 def test_file_is_text_as_stated(tmp_path: Path) -> None:

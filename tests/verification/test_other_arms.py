@@ -227,9 +227,9 @@ def test_what_is_judged_is_what_the_hash_is_of(
     path, _ = write_pair(tmp_path, 2)
     whole, read = read_problem(path), others.read_trajectory_text
 
-    def changed(file: Path, *more: Any) -> Trajectory:
+    def changed(file: Path, *more: Any, **how: Any) -> Trajectory:
         file.write_text("")
-        return read(file, *more)
+        return read(file, *more, **how)
 
     monkeypatch.setattr(others, "read_trajectory_text", changed)
     found = read_problem(path)

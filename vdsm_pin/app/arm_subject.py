@@ -53,7 +53,8 @@ class ArmSubject:
     def read(self, file: Path) -> Trajectory:
         """Read the motion of a file."""
         arm, joined = self.problem.manipulator, self.options.interpolation
-        motion = read_trajectory(file, arm, joined)
+        asked = self.problem.tip_path is not None
+        motion = read_trajectory(file, arm, joined, places=asked)
         check_times(file, self.problem.scene, motion)
         return motion
 

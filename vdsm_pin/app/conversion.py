@@ -69,7 +69,8 @@ class Given:
             return read_cables(self.cables, problem)
         if is_bag(self.file) or self.file.suffix.lower() in ENDINGS:
             return read_arm_message(self.file, problem.manipulator)
-        return read_trajectory(self.file, problem.manipulator)
+        asked = problem.tip_path is not None
+        return read_trajectory(self.file, problem.manipulator, places=asked)
 
 
 def convert_to_folder(

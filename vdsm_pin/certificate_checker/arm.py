@@ -71,7 +71,7 @@ class Arm:
         belongs(header, "errors", problem.sha256, sha256_of_file(trajectory))
         joined, known = header["interpolation"], ("linear", "cubic", "quintic")
         claim(joined in known, f"interpolation is {joined}, expected one of {known}")
-        rows = read_trajectory(trajectory, self.arm, joined)
+        rows = read_trajectory(trajectory, self.arm, joined, bool(problem.tip_path))
         self.lengths = self.arm.link_lengths.tolist()
         self.solids = [solid(x, header["links"]) for x in problem.scene.obstacles]
         self.meshes = {s.name: s for s in self.solids if isinstance(s, Mesh)}

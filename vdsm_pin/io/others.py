@@ -148,7 +148,9 @@ class OtherReader:
         arm = ArmBuilder(*known, (*at, "manipulator")).build(model.manipulator)
         try:
             content = read_bytes(file, limit=MAX_BYTES)
-            motion = read_trajectory_text(file, as_text(BytesIO(content)), arm)
+            motion = read_trajectory_text(
+                file, as_text(BytesIO(content)), arm, places=False
+            )
         except InvalidFile as error:
             raise self.document.invalid_file(where, model.trajectory, error) from None
         own = (self.folder / name for name in files_of_arm(model.manipulator))

@@ -153,7 +153,10 @@ def _rows_text(trajectory: Trajectory, first: int) -> bytes:
 
 
 def read_trajectory(
-    path: str | Path, manipulator: Manipulator, interpolation: Interpolation = "auto"
+    path: str | Path,
+    manipulator: Manipulator,
+    interpolation: Interpolation = "auto",
+    places: bool = True,
 ) -> Trajectory:
     """Read a trajectory of any origin.
 
@@ -161,6 +164,7 @@ def read_trajectory(
         path: The CSV file.
         manipulator: The arm that it is for; fixes the columns.
         interpolation: What joins the rows.
+        places: Whether the rows must say where on a desired path they are.
 
     Returns:
         The trajectory; numbers as in the file to the last bit. Its notes name the
@@ -175,31 +179,38 @@ def read_trajectory(
     file = Path(path)
     check_is_file(file)
     with readable(file), open_text(file) as text:
-        return read_trajectory_text(file, text, manipulator, interpolation)
+        how = interpolation, places
+        return read_trajectory_text(file, text, manipulator, *how)
 
 
 def read_trajectory_text(
-    file: Path, text: TextIO, arm: Manipulator, interpolation: Interpolation = "auto"
+    file: Path,
+    text: TextIO,
+    arm: Manipulator,
+    interpolation: Interpolation = "auto",
+    places: bool = True,
 ) -> Trajectory:
     """Read the text of a trajectory, as `read_trajectory` does."""
     columns = column_names(arm.n_links)
+    needed = [name for name in columns if places or name not in PLACE]
     rates, changes = (rate_names(arm.n_links, order) for order in (1, 2))
     more = {"linear": (), "cubic": rates}.get(interpolation, (*rates, *changes))
     table = Table(file, text, {*columns}.__contains__)
-    table.choose(columns, (TIME, *more))
+    table.choose(needed, (*(() if places else PLACE), TIME, *more))
     _check_arm(file, table.ignored, arm)
     found = table.columns
     smooth = _smooth_columns(file, found, (rates, changes), interpolation)
     rows = read_waypoints(table)
     _check_values(rows)
-    whole = rows.rows
-    n, first = len(columns), [found.index(names[0]) for names in smooth]
-    further = [whole[:, k : k + n - 3] for k in first] + [None, None]
+    whole, told = rows.rows, set(PLACE) <= set(found)
+    first = [found.index(names[0]) for names in ((X0,), *smooth)]
+    joints, *pieces = (whole[:, k : k + 1 + 2 * arm.n_links] for k in first)
+    further = [*pieces, None, None]
     return Trajectory.of_joints(
-        whole[:, 3:n],
-        whole[:, 1] != 0.0,
-        whole[:, 2],
-        whole[:, found.index(TIME)] if TIME in found else None,
+        joints,
+        rows[PLACE[0]] != 0.0 if told else None,
+        rows[PLACE[1]] if told else None,
+        rows[TIME] if TIME in found else None,
         further[0],
         further[1],
         table.notes,
