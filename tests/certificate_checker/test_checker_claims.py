@@ -1,7 +1,7 @@
 """What a plane proves, and which pairs and lines there must be."""
 
 from collections.abc import Iterator
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path as File
 from types import SimpleNamespace
 from typing import Any
@@ -171,7 +171,6 @@ def test_as_much_as_is_proved_may_be_claimed_to_the_last_bit(
     ],
 )
 def test_pieces_are_tiled(ranges: list[tuple[int, int]], reason: str) -> None:
-    """And a body is told to be held off some pieces where there are two ranges."""
     interval = Interval(Tree([]), [])
     rest = Solid("rest", np.zeros((12, 3, 3)))
     pair = Pair(Body(0, Solid("body", [[[0.0, 0.0, 0.0]]])), rest, 0, 0.0, 0.0)
@@ -182,11 +181,6 @@ def test_pieces_are_tiled(ranges: list[tuple[int, int]], reason: str) -> None:
     else:
         planes = [*tiled(pair, proof, "", interval)]
         assert [(one.first, one.last) for one in planes] == ranges
-        assert rest.split == {pair.body.solid}
-        one = [[0.0, 1.0, [[0, 12, 0, 0, 1, 0.5]]]]
-        whole = Solid("whole", np.zeros((12, 3, 3)))
-        assert [*tiled(pair._replace(solid=whole), one, "", interval)]
-        assert not whole.split
 
 
 @pytest.mark.parametrize(
@@ -213,6 +207,29 @@ def test_slices_are_tiled(ends: list[tuple[float, float]], reason: str) -> None:
     else:
         planes = [*tiled(pair, proof, "", interval)]
         assert [one.slice for one in planes] == [(interval, *both) for both in ends]
+
+
+def test_pairs_of_planes_for_single_pieces_are_told() -> None:
+    """Among three pairs: none, one slice of two, and planes that tile all of it."""
+    joint = Joint(0, SLIDES, (1, 0, 0), np.eye(4), (0, 1.0, 0.0))
+    path = Path(Branch(np.array([[0.0], [0.1]]), None))
+    wall = Solid("wall", [[[1.0, y, z] for y in (-1, 1)] for z in (-1, 1)])
+    whole, first, second = [0, 2], [0, 1], [1, 2]
+    proofs, pairs = [], []
+    for k, slices in enumerate(
+        [[[whole]], [[whole], [first, second]], [[first, second]]]
+    ):
+        body = Body(1, Solid(f"ball {k}", [[[0.0, 0.0, 0.0]]], radius=0.1))
+        pairs.append(Pair(body, wall, 0, 0.0, 0.0))
+        ends = np.linspace(0.0, 1.0, len(slices) + 1).tolist()
+        proofs.append([
+            [*both, [[*of, 1, 0, 0, 0.5] for of in planes]]
+            for both, planes in zip(pairwise(ends), slices, strict=True)
+        ])  # fmt: skip
+    clearances = Clearances(Tree([joint]), path, pairs)
+    first_pose, by_pieces = clearances.check(iter([{"k": 0, "proofs": proofs}]))
+    assert by_pieces == {*pairs[1:]}
+    assert first_pose[1][0].entries() == [0, 0, 0]
 
 
 @pytest.mark.parametrize("at_once", [0, 1, 5])

@@ -4,7 +4,7 @@ Joint 0 is the rail, 2 i - 1 and 2 i are yaw and pitch of link i; then come the 
 that carry obstacles.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from itertools import combinations
 from pathlib import Path as File
 from typing import Any
@@ -138,7 +138,7 @@ class Arm:
         names = near.solid.name, far.solid.name
         return near.frame < far.frame and not self._ignored(*names)
 
-    def check_outside(self, first: Any) -> None:
+    def check_outside(self, first: Any, by_pieces: Set[Pair]) -> None:
         """Check that what is not clear of a mesh's hull begins outside.
 
         A body never meets the mesh's triangles, so one point of it decides; that at O_1
@@ -146,12 +146,13 @@ class Arm:
 
         Args:
             first: The pose as the motion begins.
+            by_pieces: The pairs that planes for single pieces hold apart.
         """
         own = [body for body in self.bodies if body.own]
         thinnest = min(body.solid.radius for body in own)
-        for mesh in (mesh for mesh in self.meshes.values() if mesh.split):
+        for mesh in self.meshes.values():
             held = [pair for pair in self.pairs if pair.solid is mesh]
-            pairs, points = [p for p in held if p.body.solid in mesh.split], []
+            pairs, points = [pair for pair in held if pair in by_pieces], []
             if {*own} <= {p.body for p in held} and any(p.body.own for p in pairs):
                 points = [(first[1], column(0, 0, 0), thinnest)]
                 pairs = [pair for pair in pairs if not pair.body.own]

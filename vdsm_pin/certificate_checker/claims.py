@@ -41,36 +41,42 @@ class Clearances:
         self.tree, self.path, self.pairs = tree, path, pairs
         self.place, self.n_intervals = "after the header", 0
         self.n_claims = self.n_settled = 0
-        self.first: Pose  # as the motion begins
         self.waiting = defaultdict[Pair, list[Plane]](list)
 
-    def check(self, lines: Iterator[dict[str, Any]]) -> None:
+    def check(self, lines: Iterator[dict[str, Any]]) -> tuple[Pose, set[Pair]]:
         """Check them; planes in good order are looked at many at a time.
+
+        Returns:
+            The pose as the motion begins, and the pairs that planes for single pieces
+            hold apart: only their bodies may begin inside of a mesh.
 
         Raises:
             Rejected: At the first claim that does not hold; `place` says where.
         """
-        before: Pose | None = None
+        first = before = Interval(self.tree, self.path.controls(0)).pose(0.0)
+        by_pieces = set[Pair]()
         for k, line in enumerate(lines):
             self.place = f"interval {k}"
             claim(k < self.path.size, "lies beyond the last row")
             claim(set(line) == {"k", "proofs"} and line["k"] == k, "is missing")
             motion = Interval(self.tree, self.path.controls(k), before)
-            self.first = motion.pose(0.0) if before is None else self.first
             found, expected = len(line["proofs"]), len(self.pairs)
             claim(found == expected, f"{found} of {expected} pairs")
             for pair, proof in zip(self.pairs, line["proofs"], strict=True):
                 self.place = f"interval {k}, {' and '.join(pair.names)}"
                 planes = [*tiled(pair, proof, self.place, motion)]
+                if any(x.last - x.first < len(pair.solid.points) for x in planes):
+                    by_pieces.add(pair)
                 self.waiting[pair] += planes
                 self.n_claims += len(planes)
             if self.n_claims - self.n_settled > AT_ONCE:
                 self._settle()
             self.n_intervals, self.place = k + 1, f"after interval {k}"
             before = motion.pose(1.0)
-        missing = self.n_intervals < self.path.size
-        claim(not missing, f"interval {self.n_intervals} is missing")
+        last = self.n_intervals == self.path.size
+        claim(last, f"interval {self.n_intervals} is missing")
         self._settle()
+        return first, by_pieces
 
     def _settle(self) -> None:
         """Check the planes that wait."""
@@ -106,7 +112,6 @@ def tiled(pair: Pair, proof: Any, place: str, motion: Interval) -> Iterator[Plan
             yield Plane(place, slice_, reached, last, (x, y, z), lower)
             reached = last
         claim(reached == size, f"the pieces end at {reached} of {size}")
-        pair.solid.split |= {pair.body.solid} if len(planes) > 1 else set()
         time = slice_[2]
     claim(time == 1.0, f"the slices end at {time}")
 

@@ -94,9 +94,7 @@ class _Run:
     """One run of the checker; `place` says where it is."""
 
     def __init__(self) -> None:
-        self.judged = ""
         self.parts = list[Any]()  # those that are checked, and where they are
-        self.notes = list[str]()
 
     @property
     def place(self) -> str:
@@ -104,7 +102,8 @@ class _Run:
 
     def check(
         self, lines: Iterator[dict[str, Any]], problem: Path, trajectory: Path
-    ) -> None:
+    ) -> tuple[str, list[str]]:
+        """What is judged, and what was assumed."""
         try:
             asks: Any = partial(Arm, read_problem(problem, other_robot))
         except ProblemOfRobot:
@@ -118,10 +117,10 @@ class _Run:
         expected = [pair.names for pair in asked.pairs]
         claim(header["pairs"] == expected, "the pairs are not those of the problem")
         self.parts.append(Clearances(asked.tree, asked.path, asked.pairs))
-        self.parts[0].check(lines)
+        first, by_pieces = self.parts[0].check(lines)
         self.parts.append(asked.rows)
-        asked.rows.check(self.parts[0].first)
-        self.notes, self.judged = asked.notes, asked.judged
+        asked.rows.check(first, by_pieces)
+        return asked.judged, asked.notes
 
 
 def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Outcome:
@@ -139,17 +138,17 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
         InvalidFile: If one of the files is not what its format says.
     """
     check_is_file_or_bag(trajectory)
-    run, reason = _Run(), ""
+    run, reason, judged, notes = _Run(), "", "", list[str]()
     with ctx.workprec(PRECISION), np.errstate(all="ignore"):
         try:
-            run.check(_lines(certificate), problem, trajectory)
+            judged, notes = run.check(_lines(certificate), problem, trajectory)
         except Rejected as error:
             reason = printable(f"{run.place}: {error}")
         except DAMAGE as error:
             text = f"cannot be read as a certificate: {error}"
             raise InvalidFile(file=certificate, where=run.place, problem=text) from None
     counts = [(one.n_intervals, one.n_claims) for one in run.parts[:1]] or [(0, 0)]
-    return Outcome(run.judged, reason, *counts[0], tuple(run.notes))
+    return Outcome(judged, reason, *counts[0], tuple(notes))
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -4,7 +4,7 @@ The URDF is read here once more; joint 0 is fixed and holds the root link.
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from itertools import combinations, product
 from pathlib import Path as File
 from typing import Any, Final, NamedTuple
@@ -341,14 +341,18 @@ class Robot:
         near = moving == 1 and self.model.srdf is None
         return moving > 0 and not near and frozenset((one, other)) not in left
 
-    def check(self, first: Pose) -> None:
+    def check(self, first: Pose, by_pieces: Set[Pair]) -> None:
         """Check that links begin outside of meshes, and that joints keep their limits.
+
+        Args:
+            first: The pose as the motion begins.
+            by_pieces: The pairs that planes for single pieces hold apart.
 
         Raises:
             Rejected: If one does not; `place` says where.
         """
         for pair in self.pairs:
-            if isinstance(pair.solid, Mesh) and pair.body.solid in pair.solid.split:
+            if isinstance(pair.solid, Mesh) and pair in by_pieces:
                 pair.solid.check_outside(first[pair.rest], [pair.inner(first)])
         for k in range(self.own.size):
             self.place, ends = f"interval {k}", self.own.times[k : k + 2].tolist()

@@ -1,5 +1,6 @@
 """The rows of an arm's trajectory against what the problem asks of the whole motion."""
 
+from collections.abc import Set
 from functools import reduce
 from typing import Any, Final
 
@@ -19,6 +20,7 @@ from vdsm_pin.certificate_checker.balls import (
 )
 from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, kept, part
 from vdsm_pin.certificate_checker.path import Drawing
+from vdsm_pin.certificate_checker.solids import Pair
 from vdsm_pin.certificate_checker.tree import Pose, frame_of
 from vdsm_pin.problem.planning_problem import Posture
 from vdsm_pin.problem.trajectory import Trajectory
@@ -42,17 +44,18 @@ class Rows:
         self.ordered = path is not None and path.order == "as_given"
         self.link, self.last = frame_of(len(arm.lengths)), arm.lengths[-1]
 
-    def check(self, first: Pose) -> None:
+    def check(self, first: Pose, by_pieces: Set[Pair]) -> None:
         """Check them all.
 
         Args:
             first: The pose as the motion begins.
+            by_pieces: The pairs that planes for single pieces hold apart.
 
         Raises:
             Rejected: At the first thing that is not as asked; `place` says where.
         """
         (tree, path), before = self.arm.own, None
-        self.arm.check_outside(first)
+        self.arm.check_outside(first, by_pieces)
         for k in range(path.size):
             self.place = f"interval {k}"
             motion = Interval(tree, path.controls(k), before)

@@ -41,7 +41,6 @@ class Solid:
     ) -> None:
         self.name, self.points, self.radius = name, np.array(points, float), radius
         self.disc_axis, self.disc_radius = np.array(disc[0]), disc[1]
-        self.split = set[Solid]()  # bodies held off it by planes that serve some pieces
         self.normal: Any = None  # of a half-space
         self.ends: Any = None  # of a prism: its corners at both, shape (2, c, 3)
         far = np.abs(self.points).max() + np.abs(origin).max()
@@ -177,7 +176,7 @@ class Compound:
         order, every = told.get(name, {"order": ()})["order"], [*range(len(parts))]
         good = sorted(order or every) == every
         claim(good, f"pieces of {name} do not make up the whole")
-        self.name, self.split, self.parts = name, set[Solid](), named_parts(parts)
+        self.name, self.parts = name, named_parts(parts)
         self.points: list[Solid] = [parts[k] for k in [*order] or every]
         self.normal, self.extent = None, max(one.extent for one in parts)
 
