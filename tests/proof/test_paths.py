@@ -137,6 +137,10 @@ def test_rows_within_intervals_are_those_at_their_times() -> None:
         path.within(intervals, shares), path.at(moments), atol=1e-12
     )
     np.testing.assert_array_equal(path.at_moments(np.arange(6.0)), path.knots)
+    for seed in range(40):  # an interval ends at its knot to the last bit
+        ends = Path(np.random.default_rng(seed).normal(size=(4, 3)))
+        at_end = ends.within(np.arange(3), np.ones(3))
+        np.testing.assert_array_equal(at_end, ends.knots[1:])
     one = Path(path.knots[:1])
     np.testing.assert_array_equal(
         one.within(intervals[:2], shares[:2])[1], one.knots[0]

@@ -7,27 +7,35 @@ from math import ceil, floor
 
 import numpy as np
 import pytest
+from oracles.plain import plain
 from oracles.shortcuts import start_proof
 from oracles.tree_queries import TreeQuery, at, from_piece, make_query, unit
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
-from vdsm_pin.proof import stretches
+from vdsm_pin.proof import search, stretches
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
+    END,
+    KEY,
     LOW,
     OTHER,
     OWN,
+    SLICE,
     SLICES,
+    START,
     TIME,
     UP,
 )
+from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import Budget, Proving, dense_rows
 from vdsm_pin.proof.results import Dense
+from vdsm_pin.proof.row_places import fill_rows
+from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 
@@ -180,3 +188,52 @@ def test_a_stretch_begins_and_ends_where_it_is_asked(low: float, high: float) ->
     np.testing.assert_allclose(
         found.best[:, AT_UPPER] + found.best[:, TIME], [low, high], atol=1e-12
     )
+
+
+@pytest.mark.parametrize("parts", [2.0, 0.5])
+def test_the_shortest_slices_are_split_no_more(parts: float) -> None:
+    """Of a joint that turns so fast that not even the shortest slice proves a thing."""
+    turn = Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    bodies = [Body(k, (Hull(np.array([[x, 0.0, 0.0]]), 0.1),))
+              for k, x in ((1, 1.0), (0, 9.0))]  # fmt: skip
+    path, pairs = Path(np.array([[0.0], [1e12]])), PairTable.of([Pair(0, 1)])
+    proving, _ = start_proof(turn, bodies, path, pairs)
+    work, row = proving.work, np.zeros(SLICE)
+    slicing = search.Slicing(proving.task, proving.motion, work.ends, work.space)
+    row[START], row[END], row[KEY] = 0.5, 0.5 + parts * search.SHORTEST, -np.inf
+    heap = np.zeros((8, SLICE))
+    asked, expected = plain(search.new_witness)(), 2 if parts > 1.0 else 1
+    found = plain(search.resolve)(slicing, heap, row.copy(), asked)
+    assert found == (UNDECIDED, expected)
+    heap[0], met = row, plain(search.new_witnesses)(1, 9.0)
+    assert plain(search.tighten)(slicing, heap, 1, met) == expected
+
+
+def test_the_first_block_is_looked_at_again_when_it_holds_the_least() -> None:
+    """Rows of the last block stand there; oracle: the first rows by themselves."""
+    rng, turn = np.random.default_rng(41), Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    corners = rng.uniform(-0.2, 0.2, (2, 9, 3))
+    corners[:, :, 0] += [[1.0], [1.6]]
+    bodies = [Body(k, (Hull(c),)) for k, c in zip((1, 0), corners, strict=True)]
+    near, far = np.linspace(-0.3, 0.3, 9), np.linspace(0.4, 2.0, BLOCK)
+    path = Path(np.append(near, far)[:, None])
+    few, whole = (prove(turn, bodies, one, [Pair(0, 1)])
+                  for one in (path.between(0, 8), path))  # fmt: skip
+    assert whole.lower[0] == pytest.approx(few.lower[0], abs=1.1e-6)
+    assert whole.upper[0] == pytest.approx(few.upper[0], abs=1.1e-6)
+    assert 0.0 < whole.lower[0] <= whole.upper[0] <= whole.lower[0] + 1.1e-6
+    assert whole.interval[0] < 8
+
+
+def test_a_sweep_that_is_out_of_time_judges_nothing() -> None:
+    slide = Tree((Joint(0, Kind.PRISMATIC, (1.0, 0.0, 0.0), column=0),))
+    bodies = [Body(k, (Hull(np.array([[2.0 * k, 0.0, 0.0]]), 0.1),)) for k in (0, 1)]
+    pairs, path = PairTable.of([Pair(0, 1)]), Path(np.zeros((4, 1)))
+    for until in (0.0, np.inf):
+        budget = Budget(until=until)
+        proving, _ = start_proof(slide, bodies, path, pairs, budget=budget)
+        asked = proving.task, proving.motion, proving.work, proving.results
+        plain(fill_rows)(proving.task, proving.motion, proving.work.rows, 0, 3)
+        stretch = Stretch(0, 0, 3, False, False, False)
+        assert plain(sweep_pair)(*asked, 0, stretch) == (until > 0.0)
+        assert proving.results.counts.sum() == (3 if until > 0.0 else 0)
