@@ -20,7 +20,7 @@ from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
-from vdsm_pin.planner.fewest import elastic_band
+from vdsm_pin.planner.fewest import elastic_band, insertion
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.elastic_band import resampled
@@ -257,6 +257,28 @@ def test_a_second_way_takes_the_other_window() -> None:
     one, other = space_of(task).routes(task.path.points[0], 2)
     assert sorted(np.sign([side_of(one), side_of(other)])) == [-1.0, 1.0]
     assert length_of(one) < length_of(other) + 0.2
+
+
+def test_a_second_way_is_short_where_the_first_is_wide() -> None:
+    """A slot straight ahead, as long as it is narrow, between two wide windows."""
+    half = ARM.link_radius + 0.0035 + 0.008
+    bars = [
+        Box(f"bar{n}", np.array([1.0, (a + b) / 2, 0.0]), np.eye(3),
+            np.array([0.4, (b - a) / 2, 3.0]))
+        for n, (a, b) in enumerate(
+            [(-3.0, -0.6), (-0.3, -half), (half, 0.3), (0.6, 3.0)]
+        )
+    ]  # fmt: skip
+    roofs = [
+        Box(f"roof{z}", np.array([1.0, 0.0, z]), np.eye(3), np.array([0.02, 3, 2.9]))
+        for z in (-3.0, 3.0)
+    ]
+    goal = np.array([[2.0, 0.0, 0.0], [2.1, 0.0, 0.0]])
+    task = problem(*bars, *roofs, points=goal, start=(0.0, 0.0, 0.0), closed=False)
+    wide, short = space_of(task).routes(goal[0], 2)
+    assert 0.3 < abs(side_of(wide)) < 0.6
+    assert abs(side_of(short)) < half
+    assert length_of(short) < length_of(wide) - 0.02
 
 
 def test_ways_avoid_where_an_arm_got_stuck() -> None:
@@ -496,6 +518,31 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     assert route[drawn].sum() == pytest.approx(task.path.length - found.missing)
     on_line = found.corners.tips[:-1][drawn]
     np.testing.assert_allclose(on_line[:, [0, 2]] - [2.4, 0.0], 0.0, atol=1e-12)
+
+
+def test_an_arm_that_gets_in_farther_on_draws_from_where_it_did_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    visited, places = insertion._Search._visit, list[int]()
+
+    def visit(self: insertion._Search, k: int) -> insertion._Visit | None:
+        places.append(k)
+        return visited(self, k) if k == 2 else None
+
+    monkeypatch.setattr(insertion._Search, "_visit", visit)
+    points = np.array([[1.5, 0.2, 0.0], [1.5, 0.4, 0.0]])
+    task = problem(points=points, closed=False, start=START)
+    rows = path_rows(task.path)
+    closed = np.zeros(len(rows.tips), dtype=np.bool_)
+    effort = Insert(population=4, routes=1, backtracks=1, seed=0)
+    found = insert(judge_of(task), space_of(task), rows, closed, effort).found
+    assert found is not None
+    assert places == [0, 1, 2]
+    assert not found.skipped
+    drawn = found.corners.drawn
+    steps = np.linalg.norm(np.diff(found.corners.tips, axis=0), axis=1)
+    assert steps[drawn].sum() == pytest.approx(0.2)
+    np.testing.assert_allclose(found.corners.tips[:-1][drawn][0], points[0])
 
 
 @pytest.mark.parametrize("count", [3, 8])

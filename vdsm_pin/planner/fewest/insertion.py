@@ -128,13 +128,14 @@ class _Search:
         """Visits until the path's end is reached or too many are in vain."""
         visits: list[_Visit] = []
         skipped: list[int] = []
-        k, failures, last = 0, 0, len(self.tips) - 1
+        k, failures, last, begin = 0, 0, len(self.tips) - 1, 0
         # Where a part of the path is no answer, nobody need look for one.
         most = 1 if self.judge.problem.path.blocked is Blocked.FAIL else FAILURES
         while k < last:
             if self.route.closed[k + 1] or failures == most or (visits and soon.passed):
                 k += 1
                 skipped.append(k)
+                begin = k
                 continue
             visit = self._visit(k)
             if visit is None or visit.last <= k:
@@ -142,8 +143,11 @@ class _Search:
                 k += 1
                 skipped.append(k)
                 continue
+            whole = self._back_to(visit, begin) if begin < k else None
+            if whole is not None:
+                visit, skipped = whole, skipped[: begin - k]
             visits.append(visit)
-            k = visit.last
+            k = begin = visit.last
         if not visits:
             return None
         return Found(self.route, self._corners(visits), tuple(skipped))
@@ -160,23 +164,10 @@ class _Search:
 
     def _visit(self, k: int) -> _Visit | None:
         """The visit that draws most from layer k on."""
-        shut = np.flatnonzero(self.route.closed[k + 1 :])
-        end = k + 1 + int(shut[0]) if len(shut) else len(self.tips)
         best: _Visit | None = None
-        path = self.tips[k:end]
+        path = self._path(k)
         for route in self._routes(path):
-            before = len(route) - 1
-            tolerance = np.zeros(before + len(path))
-            tolerance[1:before] = (
-                TIP_TOLERANCE * self.judge.problem.manipulator.most_radius
-            )
-            tips = np.vstack([route, path[1:]])
-            layers = Layers(tips, tolerance, *self._aims(k, before, tips))
-            population = Population(
-                self.judge, layers, self.rng, self.effort.population, self.effort.led
-            )
-            chain = population.grow(self.root[None], self.effort.backtracks)
-            visit = _Visit(k, before, chain, route)
+            visit = self._grown(k, route)
             if self.farthest is None or visit.come > self.farthest.come:
                 self.farthest = visit
             if best is None or visit.last > best.last:
@@ -186,11 +177,39 @@ class _Search:
                 "an arm came %.0f %% of a way in, to %s along the path", 100.0 * part,
                 in_mm(float(self.route.stations[reached]) if reached >= 0 else 0.0),
             )  # fmt: skip
-            if best.last == end - 1:
+            if best.last == k + len(path) - 1:
                 break
             if best.last < k:
-                self.space.avoid(route[min(int(chain.layer[-1]) + 1, before)])
+                reached = int(visit.chain.layer[-1])
+                self.space.avoid(route[min(reached + 1, visit.before)])
         return best
+
+    def _back_to(self, visit: _Visit, first: int) -> _Visit | None:
+        """A visit that draws as far, and from an earlier layer, come to by the later.
+
+        An arm that got in at a later place draws back to where it did not get in.
+        """
+        back = self.tips[first : visit.first][::-1]
+        whole = self._grown(first, np.vstack([visit.route, back]))
+        return whole if whole.last >= visit.last else None
+
+    def _path(self, k: int) -> FloatArray:
+        """Tips from a layer on to the next that nobody can reach, shape (n, 3); [m]."""
+        shut = np.flatnonzero(self.route.closed[k + 1 :])
+        return self.tips[k : k + 1 + int(shut[0]) if len(shut) else len(self.tips)]
+
+    def _grown(self, k: int, route: FloatArray) -> _Visit:
+        """The visit by one way of the tip, shape (n, 3) [m], to layer k and on."""
+        path, before = self._path(k), len(route) - 1
+        tolerance = np.zeros(before + len(path))
+        tolerance[1:before] = TIP_TOLERANCE * self.judge.problem.manipulator.most_radius
+        tips = np.vstack([route, path[1:]])
+        layers = Layers(tips, tolerance, *self._aims(k, before, tips))
+        population = Population(
+            self.judge, layers, self.rng, self.effort.population, self.effort.led
+        )
+        chain = population.grow(self.root[None], self.effort.backtracks)
+        return _Visit(k, before, chain, route)
 
     def _aims(
         self, k: int, before: int, tips: FloatArray

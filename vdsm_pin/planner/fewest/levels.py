@@ -104,8 +104,8 @@ BESIDE: Final = Search(rounds=20, back=1.0, grow=2)
 """The first search with tips behind and beside the path."""
 
 FIRST: Final = (
-    Insert(population=10, routes=2, backtracks=2, seed=0),
-    Insert(population=10, routes=2, backtracks=3, seed=0, directed=True),
+    Insert(population=10, routes=3, backtracks=2, seed=0),
+    Insert(population=10, routes=3, backtracks=3, seed=0, directed=True),
 )
 """The first insertions."""
 

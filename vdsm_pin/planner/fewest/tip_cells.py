@@ -27,10 +27,10 @@ LONGEST: Final = 2.0
 """Length of a way, over the arm's, from which on that is no more; [-]."""
 MORE: Final = 5.0
 """How many times more that is at the largest number of cells; [-]."""
-AVOIDED: Final = 30.0
+AVOIDED: Final = 5.0
 """Cost of the cells near a place to be avoided, in their own, for each time that it is;
 [-]."""
-AROUND: Final = 3.0
+AROUND: Final = 2.0
 """How near that is, over the body's radius; [-]."""
 CAP: Final = 0.6
 """Room below this part of what is narrow costs no more; [-]."""
@@ -103,8 +103,12 @@ class TipCells(Octree):
         place[worse], best[worse] = centre[worse], spare[worse]
         return place, best
 
-    def costs(self) -> tuple[FloatArray, BoolArray]:
-        """Cost of passing each cell, inf where it is shut; whether it is in doubt."""
+    def costs(self, shortest: bool = False) -> tuple[FloatArray, BoolArray]:
+        """Cost of passing each cell, inf where it is shut; whether it is in doubt.
+
+        Args:
+            shortest: Whether what is narrow costs no more than what is wide.
+        """
         centre, half = self.boxes(self.codes, self.levels)
         (spare, best, _), radius = self.known, np.sqrt(3.0) * half
         shut = spare + radius < 0.0
@@ -114,7 +118,8 @@ class TipCells(Octree):
         # A cell that is not clear at its centre is taken for as wide as it may be.
         clearances = np.where(doubt | passed, spare + radius, best)
         narrow = NARROW * self.radius
-        cost = 2.0 * half * (1.0 + (narrow / np.maximum(clearances, CAP * narrow)) ** 2)
+        tight = (narrow / np.maximum(clearances, CAP * narrow)) ** 2
+        cost = 2.0 * half * (1.0 if shortest else 1.0 + tight)
         around = AROUND * self.radius + half
         times = np.zeros(len(half))
         for place in self.avoided:
@@ -128,14 +133,14 @@ class TipCells(Octree):
         return holders(self.codes, np.clip(place, 0, 2**DEPTH - 1).astype(np.int64))
 
     def cheapest(
-        self, start: FloatArray, goal: FloatArray, most: int
+        self, start: FloatArray, goal: FloatArray, most: int, shortest: bool = False
     ) -> FloatArray | None:
         """Points on the cheapest way that is clear, shape (k, 3).
 
         None if there is none, or none is found with so many cells.
         """
         while True:
-            cost, doubt = self.costs()
+            cost, doubt = self.costs(shortest)
             ends = self.holders(np.stack([start, goal]))
             open_ = np.isfinite(cost)
             open_[ends] = True

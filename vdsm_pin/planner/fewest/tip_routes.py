@@ -1,9 +1,9 @@
-"""Ways of the tip through the openings of a scene, the widest first.
+"""Ways of the tip through the openings of a scene, the widest first, then the shortest.
 
 The cheapest way through the cells of an octree (`tip_cells`) is pulled to the middle of
-the openings (`elastic_band`). A second way avoids the narrowest place of the first, and
-where an arm got stuck. These are proposals for the search of the arm's motion: nothing
-is proved here.
+the openings (`elastic_band`). Another way avoids places where an arm got stuck, or else
+the narrowest of the ways before. These are proposals for the search of the arm's
+motion: nothing is proved here.
 """
 
 from collections.abc import Iterator
@@ -127,20 +127,33 @@ class TipSpace:
         if not (start != goal).any():
             yield start[None]
             return
-        narrow = list[FloatArray]()
         cells, route = self._begun(goal, self.most)
+        narrow, before = list[FloatArray](), list[FloatArray]()
+        shortest = False
         while route is not None:
             short = resampled(shortened(self.room, route), self.spacing)
-            for effort in QUICK, THOROUGH:
-                route = pulled(self.room, short, self.behind, effort=effort)
-                route = resampled(route, self.spacing)
-                route = refined(self.room, route, self.behind, effort)
-                yield route
-                if is_followed(self.room, route, self.behind):
-                    break
-            narrow.append(self.room.narrowest(route))
+            way = self._pulled(short, QUICK)
+            stuck = len(self.stuck)
+            yield way
+            # A longer pull comes after another way.
+            if before:
+                yield self._pulled(before.pop(), THOROUGH)
+            if not is_followed(self.room, way, self.behind):
+                before.append(short)
+            if len(self.stuck) == stuck:
+                narrow.append(self.room.narrowest(way))
             cells.avoided = [*narrow, *self.stuck]
-            route = cells.cheapest(start, goal, self.most)
+            # What is wide may be a detour on which the arm cannot follow.
+            shortest = not shortest
+            route = cells.cheapest(start, goal, self.most, shortest)
+        for short in before:
+            yield self._pulled(short, THOROUGH)
+
+    def _pulled(self, short: FloatArray, effort: tuple[int, int]) -> FloatArray:
+        """A way pulled to the middle of openings, and refined there."""
+        way = pulled(self.room, short, self.behind, effort=effort)
+        way = resampled(way, self.spacing)
+        return refined(self.room, way, self.behind, effort)
 
     def avoid(self, place: FloatArray) -> None:
         """Have ways that are looked for from now on avoid a place, shape (3,); [m]."""
