@@ -206,3 +206,35 @@ def test_architecture_names_every_module(folder: str) -> None:
     modules = {path.stem for path in (PACKAGE / folder).glob("[!_]*.py")}
     assert modules
     assert not modules - set(re.findall(r"\w+", text))
+
+
+def defined(dotted: str) -> tuple[Path, str]:
+    """The module of a function, class or method, and its last name.
+
+    Raises:
+        AssertionError: If the module does not define it.
+    """
+    path, names = PACKAGE, dotted.split(".")
+    while not path.with_suffix(".py").is_file():
+        path /= names.pop(0)
+    path, body = path.with_suffix(".py"), ast.parse(path.with_suffix(".py").read_text())
+    for name in names:
+        found = [one for one in body.body if getattr(one, "name", "") == name]
+        assert found, f"{path} has no {dotted}"
+        body = found[0]  # type: ignore[assignment]
+    return path, names[-1]
+
+
+def test_architecture_says_who_calls_whom() -> None:
+    """Every name is there, and the module that a caller stands in speaks of it."""
+    text = (PACKAGE.parent / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    above: dict[int, Path] = {}
+    for line in text.split("```\n")[1].splitlines():
+        if dotted := line.split()[:1]:
+            depth = len(line) - len(line.lstrip())
+            path, name = defined(*dotted)
+            if depth:
+                words = re.findall(r"\w+", above[depth - 2].read_text(encoding="utf-8"))
+                assert name in words, f"{above[depth - 2]} does not call {dotted[0]}"
+            above[depth] = path
+    assert len(above) > 5
