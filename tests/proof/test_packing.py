@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.tree_queries import random_tree, unit
+from oracles.tree_queries import random_box, random_tree, unit
 
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, ends_of
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
@@ -12,8 +12,11 @@ from vdsm_pin.proof.moving_sides import FEW
 from vdsm_pin.proof.packed_tree import FIXED, PRISMATIC, REVOLUTE, pack_tree
 from vdsm_pin.proof.packing import for_motion, pack_task, with_errors
 from vdsm_pin.proof.parts import planned_parts
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.proving import Budget, new_proving
+from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import ACROSS, WITHIN, WORLD, Rules
-from vdsm_pin.proof.tree import Kind, Tree
+from vdsm_pin.proof.tree import Joint, Kind, Tree
 
 RULES = Rules(True, True, 1e-11, 1e-9, 1e-6, 0.02, np.inf)
 
@@ -149,6 +152,17 @@ def test_pairs_of_one_branch_are_of_links_and_shifts_cost_both_sides(seed: int) 
         assert turning.rules.steady == turning.rules.nominal == (not turns.any())
 
 
+def test_nothing_is_proved_of_what_no_motion_is_asked_of() -> None:
+    """Its bounds would lack the rounding: whoever packs a question is stopped."""
+    tree = Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    bodies = [Body(frame, (Hull(np.full((1, 3), frame)),)) for frame in (0, 1)]
+    asked = Question.of(tree, bodies, PairTable.of([Pair(0, 1)]))
+    motion = Path(np.zeros((1, 1))).packed()
+    for task in (asked.task, asked.task._replace(rules=RULES)):
+        with pytest.raises(AssertionError, match="of no motion"):
+            new_proving(task, motion, 1, 0, Budget())
+
+
 def test_strokes_are_as_long_as_values_get() -> None:
     rng = np.random.default_rng(3)
     kinds = {Kind.FIXED: FIXED, Kind.REVOLUTE: REVOLUTE, Kind.PRISMATIC: PRISMATIC}
@@ -159,7 +173,9 @@ def test_strokes_are_as_long_as_values_get() -> None:
         assert unknown.axis is known.axis  # packed once
         bodies = [Body(1, (Hull(np.zeros((1, 3))),)), Body(0, (Hull(np.ones((1, 3))),))]
         task = pack_task(tree, bodies, PairTable.of([Pair(0, 1)]), RULES)
-        later = for_motion(task, tree, reach, RULES)
+        errors = random_box(rng, tree)
+        later = for_motion(task, tree, reach, RULES, errors)
+        assert (later.pairs.lost >= later.rules.pad).all() and later.rules.pad > 0.0
         assert np.array_equal(later.tree.stroke, known.stroke)
         for j, joint in enumerate(tree.joints):
             assert known.kind[j] == kinds[joint.kind]

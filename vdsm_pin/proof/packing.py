@@ -84,17 +84,20 @@ def pack_task(
     return _erring(task, exact, np.zeros(n))
 
 
-def for_motion(task: Task, tree: Tree, reach: FloatArray, rules: Rules) -> Task:
-    """The same about a motion, of which errors are to be told by `with_errors`.
+def for_motion(
+    task: Task, tree: Tree, reach: FloatArray, rules: Rules, errors: ErrorBox
+) -> Task:
+    """A task of no motion, as one motion under errors asks it.
 
     Args:
         task: What is asked.
         tree: Its joints.
         reach: How large each column of q gets, shape (n_columns,).
         rules: What may be assumed.
+        errors: Of joints, placements and surfaces.
     """
     joints = task.tree._replace(stroke=strokes(tree, reach))
-    return task._replace(tree=joints, rules=rules)
+    return with_errors(task._replace(tree=joints, rules=rules), errors)
 
 
 def with_errors(task: Task, box: ErrorBox) -> Task:

@@ -192,7 +192,10 @@ def new_proving(
             world.
         budget: Sizes.
     """
-    n_intervals = max(1, len(motion.knots) - 1)
+    pad, n_intervals = task.rules.pad, max(1, len(motion.knots) - 1)
+    # What is packed for no motion yet would be proved without its rounding.
+    padded = pad > 0.0 and bool((task.pairs.lost >= pad).all())
+    assert padded, "the task is of no motion: see Question.about"
     return Proving(
         task=task,
         motion=motion,

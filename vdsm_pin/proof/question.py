@@ -10,7 +10,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.pieces import PackedPieces, joined_pieces, pack_pieces
 from vdsm_pin.proof.bodies import Body, ErrorBox, PairTable
-from vdsm_pin.proof.packing import for_motion, pack_task, with_errors
+from vdsm_pin.proof.packing import for_motion, pack_task
 from vdsm_pin.proof.parts import PartPlan, planned_parts, with_rough
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.proving import Budget, Proving, new_proving, rounding_pad
@@ -29,7 +29,8 @@ class Question:
         tree: The joints.
         plan: How the pairs are asked.
         n_pairs: Their number.
-        task: The same as compiled code reads it, without errors and of no motion.
+        task: The same as compiled code reads it, of no motion: without errors and
+            rounding, so that nothing may be proved of it.
         number: The body as it was given that each packed one is or is a part of.
         errors: Of joints, placements and of the packed bodies' surfaces.
         n_columns: Columns of a profile.
@@ -107,9 +108,9 @@ class Question:
             raise ValueError(message)
         reach = path.reach
         rules = budget.rules(rounding_pad(self.extent + added_up(tree.joints, reach)))
-        task = for_motion(self.task, tree, reach, rules)
-        asked = with_errors(task, self.errors), path.packed(), self.n_columns
-        return new_proving(*asked, self.plan.n_obstacles, budget)
+        task = for_motion(self.task, tree, reach, rules, self.errors)
+        motion, n_obstacles = path.packed(), self.plan.n_obstacles
+        return new_proving(task, motion, self.n_columns, n_obstacles, budget)
 
 
 @lru_cache(maxsize=KEPT)
