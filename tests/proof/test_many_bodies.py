@@ -20,6 +20,7 @@ from oracles.tree_queries import (
 from vdsm_pin.geometry.arrays import FloatArray, same_arrays
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof import rows, workspace
+from vdsm_pin.proof.blocks import sweep
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.broad_phase import FEW
 from vdsm_pin.proof.paths import Path
@@ -165,6 +166,29 @@ def test_each_interval_is_bracketed_by_itself(seed: int) -> None:
             assert dense.upper[k, number] >= met[-1] - 1e-9
             way = dense.own[k, number] - dense.other[k, number]
             assert met[-1] - 1e-6 <= np.linalg.norm(way) <= dense.upper[k, number] + 0.6
+
+
+@pytest.mark.parametrize("error", [0.0, 0.02])
+@pytest.mark.parametrize("seed", range(6))
+def test_yes_or_no_is_what_the_bounds_say(seed: int, error: float) -> None:
+    """All limits just below what is proved, then one just above what is met."""
+    rng = np.random.default_rng([38, seed])
+    tree, bodies, path = random_scene(rng)
+    box = ErrorBox(*(np.full(len(tree.joints), e) for e in (error, 0.0, 0.0)))
+    every = pairs_of(bodies)
+    proof = prove(tree, bodies, path, every, box)
+    apart = [k for k in range(len(every)) if proof.lower[k] > 0.01]
+
+    def answered(limits: dict[int, float]) -> bool:
+        asked = [Pair(every[k].one, every[k].other, r) for k, r in limits.items()]
+        made, _ = start_proof(tree, bodies, path, PairTable.of(asked), box)
+        parts = made.task, made.motion, made.work, made.results, made.broad
+        return bool(sweep(*parts, (0, made.n_intervals), True))
+
+    kept = {k: float(proof.lower[k]) - 1e-4 for k in apart}
+    assert answered(kept)
+    for k in rng.choice(apart, min(3, len(apart)), replace=False).tolist():
+        assert not answered(kept | {k: float(proof.upper[k]) + 1e-4})
 
 
 @pytest.mark.parametrize("error", [0.0, 0.05])
