@@ -27,7 +27,7 @@ def grown(
         shift, turn = least[off.name]
         least[off.name] = [max(shift, off.shift), max(turn, off.turn)]
     base = [asked.base, asked.base_turn]
-    cover(stated, {**joints, "base": base, "obstacles": least})
+    reject_less(stated, {**joints, "base": base, "obstacles": least})
     found = []
     for one in solids:
         shift, turn = stated["obstacles"][one.name]
@@ -35,8 +35,8 @@ def grown(
     return found
 
 
-def cover(stated: Any, asked: Any) -> None:
-    """Reject numbers of other things than those asked for, and smaller ones."""
+def reject_less(stated: Any, asked: Any) -> None:
+    """Reject numbers smaller than those asked for, and numbers of other things."""
     if isinstance(asked, list):
         stated, asked = (dict(enumerate(values)) for values in (stated, asked))
     if not isinstance(asked, dict):
@@ -45,4 +45,4 @@ def cover(stated: Any, asked: Any) -> None:
     same = isinstance(stated, dict) and stated.keys() == asked.keys()
     claim(same, f"errors: expected numbers of each of {[*asked]} alone")
     for key in asked:
-        cover(stated[key], asked[key])
+        reject_less(stated[key], asked[key])

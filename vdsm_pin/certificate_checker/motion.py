@@ -33,17 +33,21 @@ def part(points: Points, low: Ball, high: Ball) -> Points:
     return [blossom(points, [low] * (n - i) + [high] * i) for i in range(n + 1)]
 
 
-def kept(columns: Sequence[Points], good: Any, halvings: int = 20) -> bool:
-    """Whether columns keep what their polygons keep if their control points do."""
+def always(columns: Sequence[Points], good: Any, halvings: int = 20) -> bool:
+    """Whether columns of q stay in a convex set all along; `good` says what is in it.
+
+    They lie in the hull of their control points: if those are in the set, so are they.
+    Where one is not, both halves have control points of their own, which lie nearer.
+    """
     found = [good(*values) for values in zip(*columns, strict=True)]
     if all(found) or not (halvings and found[0] and found[-1]) or len(found) < 3:
         return all(found)
     parts = ([part(p, a, a + arb(0.5)) for p in columns] for a in (arb(0), arb(0.5)))
-    return all(kept(each, good, halvings - 1) for each in parts)
+    return all(always(each, good, halvings - 1) for each in parts)
 
 
 def raised(points: Points, degree: int) -> Points:
-    """The same by control points of a higher degree."""
+    """Control points of a higher degree, of the same polynomial."""
     while (n := len(points)) <= degree:
         steps = enumerate(pairwise(points), 1)
         inner = [(a * k + b * (n - k)) / n for k, (a, b) in steps]
@@ -343,9 +347,9 @@ class Slices:
         """First order of how far errors carry corners along n, shape (m, n_corners).
 
         Args:
-            body: As for `reach`, and so are `rest` and `at`.
-            rest: The same.
-            at: The same.
+            body: Its frame and its solid of one piece.
+            rest: The frame that it is seen from.
+            at: Numbers of slices, shape (m,).
             n: In the world's frame at both ends, shape (m, 2, 3).
         """
         origins, turns = (both[at] for both in self.frames)

@@ -15,7 +15,7 @@ from flint import arb, arb_mat
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.certificate_checker.balls import SLACK, Ball, belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
-from vdsm_pin.certificate_checker.motion import Branch, Path, beside, derivative, kept
+from vdsm_pin.certificate_checker.motion import Branch, Path, always, beside, derivative
 from vdsm_pin.certificate_checker.solids import (
     CUBE,
     Body,
@@ -388,4 +388,4 @@ def primitive(name: str, points: Any, cover: Any) -> Solid:
 def within(points: Any, low: float, high: float) -> bool:
     """Whether a polynomial keeps within limits."""
     slack = SLACK * max(1.0, min(abs(low), abs(high)))
-    return kept([points], lambda q: low - slack <= q <= high + slack)
+    return always([points], lambda q: low - slack <= q <= high + slack)

@@ -18,7 +18,7 @@ from vdsm_pin.certificate_checker.balls import (
     dot,
     norm,
 )
-from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, kept, part
+from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, always, part
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.certificate_checker.solids import Pair
 from vdsm_pin.certificate_checker.tree import Pose, frame_of
@@ -78,7 +78,7 @@ class Rows:
                 claim(turn <= most + SLACK, "a joint turns by {} deg", _deg(turn))
         low, high = arm.base_range
         x0, on_rail = columns[0], lambda q: low - SLACK <= q <= high + SLACK
-        claim(kept([x0], on_rail), "x0 is {} mm", MM * max(x0, key=abs))
+        claim(always([x0], on_rail), "x0 is {} mm", MM * max(x0, key=abs))
         most, link = arm.max_joint_angle + SLACK, arb(arm.max_link_angle + SLACK).cos()
 
         def in_cone(a: Ball, b: Ball) -> Ball:  # convex within the box alone
@@ -87,11 +87,11 @@ class Rows:
         for i in range(1, len(columns), 2):
             both = columns[i : i + 2]
             for name, q in zip(("alpha", "theta"), both, strict=True):
-                told = f"{name}{i // 2 + 1} is {{}} deg"
-                claim(kept([q], lambda q: abs(q) <= most), told, _deg(max(q, key=abs)))
+                told, largest = f"{name}{i // 2 + 1} is {{}} deg", max(q, key=abs)
+                claim(always([q], lambda q: abs(q) <= most), told, _deg(largest))
             psi = [(a.cos() * b.cos()).acos() for a, b in zip(*both, strict=True)]
             told = f"psi{i // 2 + 1} is {{}} deg"
-            claim(kept(both, in_cone), told, _deg(max(psi, key=float)))
+            claim(always(both, in_cone), told, _deg(max(psi, key=float)))
 
     def _tips(self, rows: tuple[int, int], motion: Interval) -> None:
         """Check the tip between two rows."""

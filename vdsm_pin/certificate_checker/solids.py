@@ -120,7 +120,7 @@ def away(points: Any, off: float) -> float:
 
 
 def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
-    """How much oftener loops run along each edge than back.
+    """Net number of times that loops run along each directed edge.
 
     Loops of the same boundary wind round each point equally often in sum. A polygon
     winds round every point of its inside, so one of the loops does: its hull has it.
