@@ -30,8 +30,8 @@ from vdsm_pin.batch.cluster import LONGEST_ERRAND
 from vdsm_pin.batch.pool import Ended
 from vdsm_pin.batch.task import Done, Settings, Task
 from vdsm_pin.batch.worker import perform
-from vdsm_pin.report.columns import write_columns
 from vdsm_pin.report.files import BatchRow
+from vdsm_pin.report.summaries import write_columns
 
 PROBLEMS = 1_000_000
 

@@ -33,7 +33,6 @@ from vdsm_pin.verification.records import (
 X, Y, Z = np.eye(3)
 RECORD = RunRecord(
     command="vdsm verify made-up.yaml --trajectory 'a b.csv' --out out",
-    problem_file="made-up.yaml",
     problem_sha256="1" * 64,
     trajectory_sha256="2" * 64,
     urdf_sha256="3" * 64,

@@ -19,7 +19,7 @@ from vdsm_pin.arm.cable_layout import paper_hole_angles
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
-from vdsm_pin.geometry.file_solids import ConvexCover
+from vdsm_pin.geometry.solids import ConvexCover
 from vdsm_pin.problem.error_boxes import ErrorBox as Box
 from vdsm_pin.problem.error_boxes import ObstacleError
 

@@ -25,7 +25,7 @@ from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
-from vdsm_pin.report.postures import at_start
+from vdsm_pin.report.impasse import at_start
 
 TETRAHEDRON = """v 0 0 900
 v 0 90 900

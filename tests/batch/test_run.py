@@ -31,7 +31,7 @@ from vdsm_pin.batch.run import Batch, Interrupted, run_batch
 from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Settings, Task
 from vdsm_pin.batch.worker import perform
 from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, UnknownName
-from vdsm_pin.report.tables import read_summary
+from vdsm_pin.report.summaries import read_summary
 
 NAMES = ("good", "other", "far", "bad")
 

@@ -44,7 +44,7 @@ def test_a_depth_beyond_the_radius_is_called_that_or_deeper(
     assert nearest is not None
     assert row.deeper == nearest.deeper == (gap < 0.0)
     assert row.worst == pytest.approx(max(gap, 0.0) - radius, abs=1e-6)
-    file = verification_file(found, RunRecord("vdsm", "p", "0"))
+    file = verification_file(found, RunRecord("vdsm", "0"))
     write_report(tmp_path / "report.html", found, file)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     # No deeper than proved: a thousandth of a millimetre above it at most.
@@ -77,7 +77,7 @@ def test_a_bound_that_leaves_the_verdict_open_is_no_depth() -> None:
 def test_a_lower_bound_of_a_depth_is_no_depth_that_was_found() -> None:
     """The axis lies 0.3 m deep in the box; the most that is measured is the radius."""
     found = beside_a_box(-0.3)
-    (row, *_) = verification_file(found, RunRecord("vdsm", "p", "0")).closest
+    (row, *_) = verification_file(found, RunRecord("vdsm", "0")).closest
     assert row.deeper
     assert row.lower_m is not None and row.lower_m < -0.3615
     assert kept_at_least(row) == at_least(row.lower_m)

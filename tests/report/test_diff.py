@@ -10,7 +10,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.report.diff import THRESHOLD, compare_folders, diff_lines
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.tables import write_summary
+from vdsm_pin.report.summaries import write_summary
 from vdsm_pin.verification.records import Verdict
 
 FILE = verification_file(made_up.verification(), made_up.RECORD)

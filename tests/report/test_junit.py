@@ -7,7 +7,7 @@ import pytest
 from lxml import etree
 
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.junit import junit_text
+from vdsm_pin.report.summaries import junit_text
 
 
 def row(folder: str, outcome: str, reason: str = "") -> BatchRow:

@@ -11,12 +11,11 @@ import pytest
 
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.report.facts import batch_row, verification_file
+from vdsm_pin.report.summaries import read_summary, write_summary
 from vdsm_pin.report.tables import (
     ClearanceCsv,
-    read_summary,
     write_cables,
     write_link_angles,
-    write_summary,
 )
 from vdsm_pin.report.thinning import nearest_obstacles
 from vdsm_pin.verification.brackets import CoalRows, LeastClearances

@@ -93,7 +93,7 @@ def test_a_limit_that_is_over_judges_no_clearance(tmp_path: Path) -> None:
         "clearance.csv from interval 0 on",
         "largest joint error",
     ]
-    file = verification_file(found, RunRecord("vdsm", "p", "0"))
+    file = verification_file(found, RunRecord("vdsm", "0"))
     assert file.time_limit_s == 2.0
     assert file.min_clearance is None
     write_report(tmp_path / "report.html", found, file)

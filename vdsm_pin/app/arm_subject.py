@@ -10,7 +10,7 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.arm_drawing import ArmDrawing
-from vdsm_pin.report.postures import at_start
+from vdsm_pin.report.impasse import at_start
 from vdsm_pin.report.tables import write_cables, write_centres, write_link_angles
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.coal_arm import coal_reach

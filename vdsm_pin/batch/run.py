@@ -38,13 +38,17 @@ from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text, writing
 from vdsm_pin.io.source import read_text
 from vdsm_pin.planner.strategies import strategy
-from vdsm_pin.report.columns import COLUMNS, write_columns
 from vdsm_pin.report.files import BatchRow, TimingFile
 from vdsm_pin.report.film import find_browser
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import write_index
-from vdsm_pin.report.junit import junit_text
-from vdsm_pin.report.tables import summary_csv, write_summary
+from vdsm_pin.report.summaries import (
+    COLUMNS,
+    junit_text,
+    summary_csv,
+    write_columns,
+    write_summary,
+)
 
 SUMMARY: Final = "summary.csv"
 RUNNING: Final = "running.csv"

@@ -66,15 +66,6 @@ def ends_of(piece: Hull | FlatCylinder) -> FloatArray:
     return np.stack([piece.centre - along, piece.centre + along])
 
 
-def placed_piece(piece: Hull | FlatCylinder, pose: FloatArray) -> Hull | FlatCylinder:
-    """A piece in another frame; `pose` is T_other_frame, shape (4, 4); [m]."""
-    turn, shift = pose[:3, :3], pose[:3, 3]
-    if isinstance(piece, Hull):
-        return Hull(frozen(piece.points @ turn.T + shift), piece.radius)
-    centre, axis = frozen(turn @ piece.centre + shift), frozen(turn @ piece.axis)
-    return replace(piece, centre=centre, axis=axis)
-
-
 @dataclass(frozen=True, eq=False)
 class HalfSpacePiece(ByValue):
     """Points p with normal . p <= offset.
@@ -89,6 +80,18 @@ class HalfSpacePiece(ByValue):
 
 
 Piece: TypeAlias = Hull | FlatCylinder | HalfSpacePiece
+
+
+def placed_piece(piece: Piece, pose: FloatArray) -> Piece:
+    """A piece in another frame; `pose` is T_other_frame, shape (4, 4); [m]."""
+    turn, shift = pose[:3, :3], pose[:3, 3]
+    if isinstance(piece, HalfSpacePiece):
+        normal = turn @ piece.normal
+        return HalfSpacePiece(normal, piece.offset + float(normal @ shift))
+    if isinstance(piece, Hull):
+        return Hull(frozen(piece.points @ turn.T + shift), piece.radius)
+    centre, axis = frozen(turn @ piece.centre + shift), frozen(turn @ piece.axis)
+    return replace(piece, centre=centre, axis=axis)
 
 
 class Hulls(Sequence[Hull]):

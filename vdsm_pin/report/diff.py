@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, VerificationFile
-from vdsm_pin.report.tables import read_summary
+from vdsm_pin.report.summaries import read_summary
 from vdsm_pin.report.words import (
     TIME_LIMIT,
     at_least,

@@ -9,7 +9,6 @@ from vdsm_pin.errors import Reached, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.postures import at_start, one_row
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,23 @@ def _arm(
         alpha, theta = joint_angles(arm, centres)
         angles = np.stack([alpha, theta], axis=2).ravel()
         joints = np.concatenate([centres[0, 0, :1], angles])
-        return one_row(joints), "where it came farthest"
+        return Trajectory.of_joints(joints[None]), "where it came farthest"
     if tip is not None and float(np.hypot(tip[1], tip[2])) < arm.total_length:
-        return one_row(straight_joints(arm, tip)), "straight"
+        return Trajectory.of_joints(straight_joints(arm, tip)[None]), "straight"
     return at_start(problem), "as it starts"
+
+
+def at_start(problem: PlanningProblem) -> Trajectory:
+    """The arm where it begins.
+
+    A start known by its tip is the straight arm's; where any start will do the arm is
+    straight along its rail.
+    """
+    arm, begin = problem.manipulator, problem.begin
+    if begin is not None:
+        given = begin.joints
+        joints = straight_joints(arm, begin.tip) if given is None else given
+    else:
+        joints = np.zeros(1 + 2 * arm.n_links)
+        joints[0] = min(max(arm.base_range[0], 0.0), arm.base_range[1])
+    return Trajectory.of_joints(joints[None])

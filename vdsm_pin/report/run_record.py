@@ -22,7 +22,6 @@ class RunRecord:
 
     Args:
         command: The exact command line.
-        problem_file: The problem as the user named it.
         problem_sha256: Of the problem file and the meshes it names.
         trajectory_sha256: Of the trajectory file; empty before there is one.
         urdf_sha256: Of the URDF the verification loaded.
@@ -30,7 +29,6 @@ class RunRecord:
     """
 
     command: str
-    problem_file: str
     problem_sha256: str
     trajectory_sha256: str = ""
     urdf_sha256: str = ""
@@ -45,17 +43,13 @@ class RunRecord:
         trajectory_sha256: str = "",
         date: str | None = None,
     ) -> "RunRecord":
-        """The record of a run on a problem; one without files is named as the command.
-
-        Arguments are as those of the record, and `source` has the problem's files.
-        """
-        file, sha256 = (str(source.path), source.sha256) if source else (command, "")
-        return cls(command, file, sha256, trajectory_sha256, urdf_sha256, date)
+        """The record of a run on a problem of these files, if it is of any."""
+        sha256 = source.sha256 if source else ""
+        return cls(command, sha256, trajectory_sha256, urdf_sha256, date)
 
     def __post_init__(self) -> None:
         """Spell what a file cannot hold: paths need not be text."""
-        for name in ("command", "problem_file"):
-            object.__setattr__(self, name, printable(getattr(self, name)))
+        object.__setattr__(self, "command", printable(self.command))
 
 
 def now() -> str:

@@ -1,10 +1,8 @@
 """CSV tables; every header carries its unit, links and joints count from 1."""
 
-import csv
 import math
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields
 from functools import cache
 from itertools import accumulate
@@ -23,7 +21,6 @@ from vdsm_pin.io.waypoint_tables import cable_columns, centre_columns
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.files import BatchRow
 from vdsm_pin.verification.brackets import (
     NOTHING_MEASURED,
     ClearanceChunk,
@@ -238,37 +235,6 @@ def write_cables(path: Path, problem: PlanningProblem, rows: Trajectory) -> None
         return np.column_stack([rows.x0[part], lengths.reshape(len(lengths), -1)])
 
     _write_rows(path, rows, cable_columns(rows.n_links), values)
-
-
-@contextmanager
-def summary_csv(path: Path) -> Iterator[Callable[[BatchRow], None]]:
-    """A table of problems, written row by row; whoever reads it finds whole rows.
-
-    Yields:
-        What writes a row.
-    """
-    # Buffered by line: a row is there as soon as it is written.
-    with path.open("w", encoding="utf-8", newline="", buffering=1) as file:
-        columns = list(BatchRow.model_fields)
-        writer = csv.DictWriter(file, columns, lineterminator="\n")
-        writer.writeheader()
-        yield lambda row: writer.writerow(row.model_dump())
-
-
-def write_summary(path: Path, rows: Iterable[BatchRow]) -> None:
-    """summary.csv of a batch."""
-    with summary_csv(path) as write:
-        for row in rows:
-            write(row)
-
-
-def read_summary(path: Path) -> tuple[BatchRow, ...]:
-    """The rows of a summary.csv."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return tuple(
-            BatchRow.model_validate({key: value for key, value in row.items() if value})
-            for row in csv.DictReader(file)
-        )
 
 
 def _write_rows(

@@ -15,7 +15,14 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Hulls, Piece
+from vdsm_pin.geometry.convex import (
+    FlatCylinder,
+    HalfSpacePiece,
+    Hull,
+    Hulls,
+    Piece,
+    placed_piece,
+)
 from vdsm_pin.geometry.depths import (
     CAPSULE,
     CYLINDER,
@@ -128,7 +135,7 @@ class _Near:
 
     def __init__(self, own: Piece, pose: FloatArray) -> None:
         self._own, self._pose = own, pose
-        (self.piece,) = in_world([own], pose)
+        self.piece = placed_piece(own, pose)
 
     @cached_property
     def inside(self) -> Inside | None:
@@ -227,22 +234,3 @@ def _hold(pieces: Sequence[Piece], corners: FloatArray, lost: float) -> bool:
     packed = pack_pieces([[piece] for piece in pieces])
     off = row_brackets(packed, ends, number, TOLERANCES.bracket_gap)[:, 1]
     return bool((off <= lost).all())
-
-
-def in_world(pieces: Sequence[Piece], placement: FloatArray) -> Iterator[Piece]:
-    """Pieces of a body where it stands.
-
-    Args:
-        pieces: In the frame that it rides on.
-        placement: T_world_frame, shape (4, 4); [m].
-    """
-    turn, shift = placement[:3, :3], placement[:3, 3]
-    for piece in pieces:
-        if isinstance(piece, HalfSpacePiece):
-            normal = turn @ piece.normal
-            yield HalfSpacePiece(normal, piece.offset + float(normal @ shift))
-        elif isinstance(piece, Hull):
-            yield Hull(piece.points @ turn.T + shift, piece.radius)
-        else:
-            centre, axis = turn @ piece.centre + shift, turn @ piece.axis
-            yield FlatCylinder(centre, axis, piece.half_length, piece.radius)

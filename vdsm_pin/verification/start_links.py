@@ -29,13 +29,7 @@ def check_links_at_start(problem: PlanningProblem, deadline: Deadline) -> None:
         if not np.hypot(*begin.tip[1:]) < arm.total_length:
             return
         joints = straight_joints(arm, begin.tip)
-    row = Trajectory(
-        np.zeros(1, bool),
-        np.zeros(1),
-        joints[:1],
-        joints[None, 1::2],
-        joints[None, 2::2],
-    )
+    row = Trajectory.of_joints(joints[None])
     alone = problem.among(np.zeros(len(problem.scene.obstacles), bool))
     proof = prove_clearance(alone, row, problem.errors, deadline=deadline)
     least = proof.with_depths(deadline).least
