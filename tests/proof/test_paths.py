@@ -43,23 +43,6 @@ def test_pieces_are_the_polynomials_that_they_fit(degree: int) -> None:
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])
-def test_a_stretch_is_the_same_polynomials(degree: int) -> None:
-    """Whole intervals, a part of one, and a knot by itself."""
-    rng = np.random.default_rng(degree)
-    for _ in range(20):
-        path, p = made(degree, rng)
-        low, high = np.sort(rng.uniform(1.0, 2.0, 2)).tolist()
-        for ends in ((0, 2), (1, 3), (1.0, high), (low, 2.0), (low, high), (3, 3)):
-            stretch = path.between(*ends)
-            begin, end = path.times_at(np.array(ends))
-            t = np.linspace(begin, end, 20)
-            truth = np.interp(t, path.times, path.knots[:, 0]) if degree == 1 else p(t)
-            np.testing.assert_allclose(stretch.at(t)[:, 0], truth, atol=1e-9)
-            assert stretch.times[0] == begin
-            assert stretch.times[-1] == end
-
-
-@pytest.mark.parametrize("degree", [1, 3, 5])
 def test_bounds_hold_over_every_slice(degree: int) -> None:
     rng, out = np.random.default_rng(degree), np.zeros(3)
     for _ in range(40):
@@ -174,7 +157,6 @@ def test_a_path_says_how_far_it_goes_and_rests_outside_of_its_times(
     one = Path(path.knots[:1], times=np.zeros(1))
     assert (one.n_intervals, one.degree) == (1, 1)
     assert np.array_equal(one.at(np.array([-1.0, 0.0, 2.0])), path.knots[[0, 0, 0]])
-    assert one.between(0, 0) is one
 
 
 def test_paths_together_begin_and_end_where_they_are_asked_to() -> None:

@@ -72,7 +72,7 @@ def test_intervals_are_judged_as_each_by_itself(seed: int) -> None:
     assert CERTIFIED < REFUTED and (found[0] != UNDECIDED).all()
     assert len({*verdicts.ravel().tolist()}) == 2
     for k in range(6):
-        one = prove(turning_arm(), bodies, path.between(k, k + 1), pairs)
+        one = prove(turning_arm(), bodies, Path(path.knots[k : k + 2]), pairs)
         np.testing.assert_array_equal(verdicts[k], one.verdict)
         assert (upper[k] >= one.upper - 1e-9).all()
         assert ((upper[k] < 0.05) == (one.verdict == REFUTED)).all()

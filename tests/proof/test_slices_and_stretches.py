@@ -216,9 +216,8 @@ def test_the_first_block_is_looked_at_again_when_it_holds_the_least() -> None:
     corners[:, :, 0] += [[1.0], [1.6]]
     bodies = [Body(k, (Hull(c),)) for k, c in zip((1, 0), corners, strict=True)]
     near, far = np.linspace(-0.3, 0.3, 9), np.linspace(0.4, 2.0, BLOCK)
-    path = Path(np.append(near, far)[:, None])
-    few, whole = (prove(turn, bodies, one, [Pair(0, 1)])
-                  for one in (path.between(0, 8), path))  # fmt: skip
+    few, whole = (prove(turn, bodies, Path(row[:, None]), [Pair(0, 1)])
+                  for row in (near, np.append(near, far)))  # fmt: skip
     assert whole.lower[0] == pytest.approx(few.lower[0], abs=1.1e-6)
     assert whole.upper[0] == pytest.approx(few.upper[0], abs=1.1e-6)
     assert 0.0 < whole.lower[0] <= whole.upper[0] <= whole.lower[0] + 1.1e-6

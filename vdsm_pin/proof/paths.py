@@ -167,24 +167,6 @@ class Path:
         """Rows of q at moments in knots, shape (m,): (m, n_columns)."""
         return self.within(*self.split(moments))
 
-    def between(self, low: float, high: float) -> "Path":
-        """The path from one moment in knots to another.
-
-        Args:
-            low: The first knot, or a moment within an interval.
-            high: The last knot, or another moment within the same interval.
-        """
-        if len(self.knots) == 1:
-            return self
-        k, last = int(low), int(high)
-        if k == low and last == high:
-            times = None if self.times is None else self.times[k : last + 1]
-            return Path(self.knots[k : last + 1], self.inner[k:last], times)
-        times = self.times_at(np.array([low, high]))
-        share = np.array([low, high]) - k
-        piece = part(self.pieces(np.array([k])), share[:1], share[1:])[0]
-        return Path(piece[[0, -1]], piece[None, 1:-1], times)
-
     def cut(self, counts: IntArray) -> "Path":
         """The same motion with each interval in equal parts; new knots are rounded.
 
