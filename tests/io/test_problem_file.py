@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from problem_texts import EVERYTHING, TETRAHEDRON, edited, write_everything
+from problem_texts import EVERYTHING, TETRAHEDRON, binary_stl, edited, write_everything
 
 from vdsm_pin.arm.cable_layout import paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
@@ -346,3 +346,37 @@ def test_schema_describes_every_field_and_the_unit_of_every_number() -> None:
             if field == "shape":
                 continue
             assert entry.get("description"), (name, field)
+
+
+def test_the_hash_takes_files_in_the_order_in_which_they_are_listed(
+    tmp_path: Path,
+) -> None:
+    """Certificates are bound to it: the file, bodies, obstacles, others, the path."""
+    for k, name in enumerate(("camera.stl", "wall.stl", "mate.stl")):
+        (tmp_path / name).write_bytes(binary_stl(TETRAHEDRON * (0.1 + 0.1 * k)))
+    (tmp_path / "line.csv").write_text("x,y,z\n1.8,0,0.1\n")
+    arm = (
+        "{link_lengths: [1, 1], link_radius: 0.05, max_link_angle_deg: 60, "
+        "max_joint_angle_deg: 60, base_range: [-5, 5], "
+        "bodies: [{name: camera, link: 1, shape: mesh, file: FILE.stl}]}"
+    )
+    text = f"""\
+vdsm_problem: 1
+length_unit: m
+manipulator: {arm.replace("FILE", "camera")}
+obstacles: [{{name: wall, shape: mesh, file: wall.stl, center: [5, 5, 5]}}]
+others:
+  - {{name: mate, trajectory: mate.csv, base: {{position: [0, 9, 0]}},
+     manipulator: {arm.replace("FILE", "mate")}}}
+tip_path: {{start: [2, 0, 0], points: [[1.9, 0, 0], {{file: line.csv}}]}}
+required_clearance: 0
+"""
+    columns = "waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,alpha2_rad,theta2_rad"
+    rows = ",time_s\n0,0,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0,1\n"
+    (tmp_path / "mate.csv").write_text(columns + rows)
+    problem = read_text(tmp_path, text)
+    assert [file.name for file in problem.files] == [
+        *("p.yaml", "camera.stl", "wall.stl", "mate.stl", "mate.csv", "line.csv")
+    ]
+    content = b"".join(file.read_bytes() for file in problem.files)
+    assert problem.sha256 == hashlib.sha256(content).hexdigest()

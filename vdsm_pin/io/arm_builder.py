@@ -1,7 +1,6 @@
 """The arm of a problem file to a `Manipulator`, in metres and radians."""
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Final, TypeAlias, cast
 
 import numpy as np
@@ -11,9 +10,9 @@ from vdsm_pin.arm.manipulator import BUILT_IN, FEED, TOOL, Manipulator, built_in
 from vdsm_pin.arm.mounted import BodySolid, Feed, LinkBody, Tool
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import arm_schema as schema
-from vdsm_pin.io.frames import Frame, Reading, radians
+from vdsm_pin.io.frames import Builder, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
-from vdsm_pin.io.problem_errors import Gathered
+from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.urdf_arm import read_urdf_arm
 from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.tolerances import TOLERANCES
@@ -33,7 +32,7 @@ ArmModel: TypeAlias = str | schema.ManipulatorModel | schema.UrdfManipulatorMode
 
 
 @dataclass(frozen=True)
-class ArmBuilder(Reading):
+class ArmBuilder(Builder):
     """Converts an arm.
 
     Args:
@@ -55,20 +54,20 @@ class ArmBuilder(Reading):
             return built_in(model)
         if isinstance(model, schema.UrdfManipulatorModel):
             return self._from_urdf(model)
-        each, lengths = Gathered(), self.frame.metres(model.link_lengths)
-        radii = each.get(lambda: self._radii(model))
+        errors, lengths = ErrorCollector(), self.frame.metres(model.link_lengths)
+        radii = errors.attempt(self._radii, model)
         tool = None
         if model.tool:
             size = model.tool.length, model.tool.radius
             tool = Tool(*(float(x) for x in self.frame.metres(size)))
             lengths[-1] += tool.length
-        bodies = each.get(lambda: self._bodies(model, float(lengths.sum())))
-        rail = each.get(lambda: self._rail(model, float(lengths.sum())))
-        thinnest = float(np.min(model.link_radius))
-        read = partial(self._cables, model.cables, model.link_lengths, thinnest)
-        cables = each.get(read)
-        each.end()
-        assert radii is not None and bodies is not None and rail and cables  # else told
+        bodies = errors.attempt(self._bodies, model, float(lengths.sum()))
+        rail = errors.attempt(self._rail, model, float(lengths.sum()))
+        thin = float(np.min(model.link_radius))
+        cables = errors.attempt(self._cables, model.cables, model.link_lengths, thin)
+        errors.raise_if_any()
+        assert radii is not None and bodies is not None
+        assert rail and cables  # what is None was raised
         with self.document.naming(self.at):
             return Manipulator(
                 model.name,
@@ -127,9 +126,8 @@ class ArmBuilder(Reading):
             if body.name in (TOOL, FEED):
                 problem = f"is {body.name!r}, which the arm's own is called"
                 raise self.invalid((*at, i, "name"), problem)
-        frame = Frame(self.frame.unit, np.eye(3), np.zeros(3))
-        known = self.document, frame, self.folder, self.digest
-        reader = ObstacleBuilder(*known, arm_length, "its joint")
+        own = self.reading.in_own_frame()
+        reader = ObstacleBuilder(own, arm_length, "its joint")
         solids = cast("tuple[BodySolid, ...]", reader.build_all(model.bodies, at))
         parts = (getattr(body, "parts", 1) for body in model.bodies)
         links = (body.link for body in model.bodies)
@@ -137,8 +135,8 @@ class ArmBuilder(Reading):
 
     def _from_urdf(self, model: schema.UrdfManipulatorModel) -> Manipulator:
         """The arm of a URDF; its bytes belong to the problem as those of meshes do."""
-        found = read_urdf_arm(self.folder / model.urdf)
-        self.digest.update(found.content)
+        found = read_urdf_arm(self.reading.folder / model.urdf)
+        self.reading.digest.update(found.content)
         low, high = found.base_range
         self._check_extent(float(found.link_lengths.sum()), max(-low, high))
         unit = UNITS_PER_METRE[self.frame.unit]

@@ -6,7 +6,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import Discriminator, Field, Tag
 
 from vdsm_pin.geometry.solids import HalfSpace
-from vdsm_pin.io.problem_errors import Gathered
+from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.schema_types import FileModel, Name, NotNegative
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.error_boxes import ErrorBox, in_si
@@ -85,17 +85,17 @@ class ErrorsModel(FileModel):
                 half-space.
         """
         solids = {one.name: solid_of(one) for one in scene.obstacles}
-        each = Gathered()
+        errors = ErrorCollector()
         for i, one in enumerate(self.obstacles):
             at = ("errors", "obstacles", i)
             if one.name not in solids:
                 known = ", ".join(solids) or "none"
                 problem = f"is {one.name!r}, expected one of {known}"
-                each.note(document.invalid((*at, "name"), problem))
+                errors.add(document.invalid((*at, "name"), problem))
             elif one.turn_deg and isinstance(solids[one.name], HalfSpace):
                 problem = "is of a half_space, which has no middle to turn about"
-                each.note(document.invalid((*at, "turn_deg"), problem))
-        each.end()
+                errors.add(document.invalid((*at, "turn_deg"), problem))
+        errors.raise_if_any()
         fields = in_si(
             UNITS_PER_METRE[unit],
             joint_deg=self.joint_deg,

@@ -3,12 +3,12 @@
 Coordinates in a file may be far larger than what is left of them beside the base. So
 frames are subtracted first, in the file's unit, where a difference is rounded once;
 what remains is converted and turned, and loses no more than its own size allows.
-Builders of the parts of a problem file are a `Reading` of it.
+A `Builder` of a part of a problem file has the `Reading` of it.
 """
 
 import math
 from collections.abc import Sequence, Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
@@ -148,6 +148,31 @@ class Reading:
     frame: Frame
     folder: Path
     digest: Digest
+
+    def in_own_frame(self) -> "Reading":
+        """The file as bodies are read that have a frame of their own."""
+        return replace(self, frame=Frame(self.frame.unit, np.eye(3), np.zeros(3)))
+
+
+@dataclass(frozen=True)
+class Builder:
+    """Converts a part of a file.
+
+    Args:
+        reading: The file.
+    """
+
+    reading: Reading
+
+    @property
+    def document(self) -> YamlDocument:
+        """The file, for messages."""
+        return self.reading.document
+
+    @property
+    def frame(self) -> Frame:
+        """Its unit and base."""
+        return self.reading.frame
 
     def invalid(self, at: Location, problem: str) -> InvalidFile:
         """The error that names a value by its field and line."""

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, singledispatchmethod
+from functools import singledispatchmethod
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -15,10 +15,10 @@ from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
 from vdsm_pin.io.clouds import RawCloud, read_cloud
-from vdsm_pin.io.frames import Frame, Reading
+from vdsm_pin.io.frames import Builder
 from vdsm_pin.io.mesh_file import MeshSize, read_mesh
 from vdsm_pin.io.motion_field import FLOATING, MotionModel, MovableModel
-from vdsm_pin.io.problem_errors import Gathered
+from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.problem import scene
@@ -40,7 +40,7 @@ def unit_vector(vector: FloatArray) -> FloatArray | None:
 
 
 @dataclass(frozen=True)
-class ObstacleBuilder(Reading):
+class ObstacleBuilder(Builder):
     """Converts the obstacles of one file.
 
     Args:
@@ -69,11 +69,11 @@ class ObstacleBuilder(Reading):
                 problem = f"is {model.name!r}, which a body of the arm is called"
                 raise self.invalid((*at, "name"), problem)
 
-        each, at = Gathered(), ("obstacles",)
-        obstacles = each.get(lambda: self.build_all(models, at))
+        errors, at = ErrorCollector(), ("obstacles",)
+        obstacles = errors.attempt(self.build_all, models, at)
         for i, model in enumerate(models):
-            each.get(partial(check, model, (*at, i)))
-        each.end()
+            errors.attempt(check, model, (*at, i))
+        errors.raise_if_any()
         return scene.Scene(obstacles or ())
 
     def build_all(
@@ -89,13 +89,13 @@ class ObstacleBuilder(Reading):
             InvalidFile: If one is not a solid, has a link's name, or two share one.
         """
         first: dict[str, int] = {}
-        each = Gathered()
+        errors = ErrorCollector()
         found = []
         for i, model in enumerate(models):
             same = first.setdefault(model.name, i)
-            each.get(partial(self._check_name, model.name, (*at, i), same))
-            found.append(each.get(partial(self._checked, model, (*at, i))))
-        each.end()
+            errors.attempt(self._check_name, model.name, (*at, i), same)
+            found.append(errors.attempt(self._checked, model, (*at, i)))
+        errors.raise_if_any()
         return tuple(one for one in found if one is not None)
 
     def _check_name(self, name: str, at: Location, first: int) -> None:
@@ -121,8 +121,8 @@ class ObstacleBuilder(Reading):
 
     def _moving(self, model: Any, motion: MotionModel, at: Location) -> scene.Moving:
         """An obstacle in its own frame, and what carries it."""
-        own = Frame(self.frame.unit, np.eye(3), np.zeros(3))
-        solid = replace(self, frame=own).build(model, at)
+        own = replace(self, reading=self.reading.in_own_frame())
+        solid = own.build(model, at)
         path = motion.carrier(self.frame, self.document, (*at, "motion"))
         return scene.Moving(solid, path, FLOATING)
 
@@ -276,7 +276,7 @@ class ObstacleBuilder(Reading):
     ) -> T:
         """The content of an obstacle's own file."""
         try:
-            return reader(self.folder / model.file, self.digest)
+            return reader(self.reading.folder / model.file, self.reading.digest)
         except InvalidFile as error:
             at = (*at, "file")
             raise self.document.invalid_file(at, model.file, error) from None

@@ -6,7 +6,6 @@ each their own.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -20,14 +19,14 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.arm_schema import ManipulatorModel, UrdfManipulatorModel
-from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.frames import Builder
 from vdsm_pin.io.obstacle_schema import FromFileModel
-from vdsm_pin.io.problem_errors import Gathered
+from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.problem_schema import OtherModel, RobotModel
 from vdsm_pin.io.source import check_is_file_or_bag, read_bytes
 from vdsm_pin.io.tables import as_text
 from vdsm_pin.io.trajectory_file import read_trajectory_text
-from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.problem.scene import ByItself, Carrier, Moving
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.tree import Tree
@@ -82,19 +81,13 @@ ReadRobot: TypeAlias = Callable[[OtherFile], Others]
 
 
 @dataclass(frozen=True)
-class OtherReader:
+class OtherReader(Builder):
     """Reads the other arms and robots of one file.
 
     Args:
-        document: The file, for messages.
-        frame: Its unit and base.
-        folder: Where relative paths start.
         read_robot: Reads robots of a URDF; None where nobody does.
     """
 
-    document: YamlDocument
-    frame: Frame
-    folder: Path
     read_robot: ReadRobot | None
 
     def read(self, models: Sequence[OtherModel]) -> Others:
@@ -105,14 +98,14 @@ class OtherReader:
         """
         bodies, files = list[Moving](), list[Path]()
         contents: dict[Path, bytes] = {}
-        each = Gathered()
+        errors = ErrorCollector()
         for i, model in enumerate(models):
-            found = each.get(partial(self._timed, model, ("others", i)))
+            found = errors.attempt(self._timed, model, ("others", i))
             if found is None:
                 continue
             bodies, files = [*bodies, *found.bodies], [*files, *found.files]
             contents |= found.contents
-        each.end()
+        errors.raise_if_any()
         return Others(tuple(bodies), tuple(files), contents=contents)
 
     def _timed(self, model: OtherModel, at: Location) -> Others:
@@ -123,7 +116,8 @@ class OtherReader:
         return found
 
     def _one(self, model: OtherModel, at: Location) -> Others:
-        where, file, pose = (*at, "trajectory"), self.folder / model.trajectory, eye(4)
+        folder, where, pose = self.reading.folder, (*at, "trajectory"), eye(4)
+        file = folder / model.trajectory
         pose[:3, :3] = self.frame.orientation(model.base.rpy_deg)
         pose[:3, 3] = self.frame.point(model.base.position)
         try:
@@ -135,17 +129,15 @@ class OtherReader:
                 problem = "is of a URDF, which is not read here"
                 raise self.document.invalid((*at, "robot"), problem)
             more = file, model.topic, frozen(pose)
-            return self.read_robot(
-                OtherFile(model.name, model.robot, self.folder, *more)
-            )
+            return self.read_robot(OtherFile(model.name, model.robot, folder, *more))
         if model.manipulator is None or model.robot is not None:
             problem = "has both or none of manipulator and robot, expected one of them"
             raise self.document.invalid(at, problem)
         if model.topic is not None:
             problem = f"is {model.topic!r}, but trajectories of snake arms are no bags"
             raise self.document.invalid((*at, "topic"), problem)
-        known = self.document, self.frame, self.folder, sha256()
-        arm = ArmBuilder(*known, (*at, "manipulator")).build(model.manipulator)
+        reading = replace(self.reading, digest=sha256())  # `build_problem` takes them
+        arm = ArmBuilder(reading, (*at, "manipulator")).build(model.manipulator)
         try:
             content = read_bytes(file, limit=MAX_BYTES)
             motion = read_trajectory_text(
@@ -153,7 +145,7 @@ class OtherReader:
             )
         except InvalidFile as error:
             raise self.document.invalid_file(where, model.trajectory, error) from None
-        own = (self.folder / name for name in files_of_arm(model.manipulator))
+        own = (folder / name for name in files_of_arm(model.manipulator))
         bodies = tuple(_bodies(model.name, arm, motion, pose))
         timed = motion.times is not None
         return Others(bodies, (*own, file), timed, {file: content})

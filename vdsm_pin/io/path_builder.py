@@ -1,7 +1,6 @@
 """The tip path of a problem file to a `DesiredPath` in the base frame."""
 
 from dataclasses import dataclass
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Final
@@ -22,7 +21,7 @@ from vdsm_pin.io.path_schema import (
     TipPathModel,
 )
 from vdsm_pin.io.posture_field import PostureBuilder
-from vdsm_pin.io.problem_errors import Gathered
+from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.tables import Table, as_text
 from vdsm_pin.problem.desired_path import Approach, Blocked, DesiredPath, Order
@@ -76,15 +75,15 @@ class PathBuilder(PostureBuilder):
             InvalidFile: If the arm cannot stand at the start, the path leaves the
                 extent for which distances are proved, or would need too many rows.
         """
-        each = Gathered()
-        start = each.get(lambda: self.start(model.start, ("tip_path", "start")))
-        insertion = each.get(lambda: self._insertion(model))
-        points = each.get(lambda: self._points(model))
+        errors = ErrorCollector()
+        start = errors.attempt(self.start, model.start, ("tip_path", "start"))
+        insertion = errors.attempt(self._insertion, model)
+        points = errors.attempt(self._points, model)
         pointing = None
         if points is not None:
-            pointing = each.get(partial(self._pointing, model, points))
-        each.end()
-        assert start and points is not None and insertion is not None  # else told
+            pointing = errors.attempt(self._pointing, model, points)
+        errors.raise_if_any()
+        assert start and points is not None and insertion is not None  # else raised
         home = model.retreat == "home"
         path = DesiredPath(
             start.tip,
@@ -183,7 +182,7 @@ class PathBuilder(PostureBuilder):
         if isinstance(part, list):
             return np.array([part])
         if isinstance(part, FilePart):
-            return read_points(self.folder / part.file, self.digest)
+            return read_points(self.reading.folder / part.file, self.reading.digest)
         if before is None:
             message = "has no point before it, expected one where it begins"
             raise InvalidInput(message)

@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag
 from vdsm_pin.arm.kinematics import joint_centres, link_angles
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.frames import Reading, radians
+from vdsm_pin.io.frames import Builder, radians
 from vdsm_pin.io.schema_types import FileModel, Number, Vector
 from vdsm_pin.io.yaml_reader import Location
 from vdsm_pin.problem.planning_problem import Posture
@@ -52,7 +52,7 @@ class GoalModel(FileModel):
 
 
 @dataclass(frozen=True)
-class PostureBuilder(Reading):
+class PostureBuilder(Builder):
     """Converts where the arm begins and ends, and refuses where it cannot stand."""
 
     arm: Manipulator

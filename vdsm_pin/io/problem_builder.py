@@ -1,8 +1,6 @@
 """A checked problem file to a planning problem: units, frames, defaults, and sense."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,12 +9,12 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.errors_field import ErrorsModel
-from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.frames import Frame, Reading
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import MAX_BYTES, Others
 from vdsm_pin.io.path_builder import PathBuilder, spacing_of
-from vdsm_pin.io.problem_errors import Gathered
-from vdsm_pin.io.source import Digest, read_bytes
+from vdsm_pin.io.problem_errors import ErrorCollector
+from vdsm_pin.io.source import read_bytes
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -32,25 +30,21 @@ from vdsm_pin.tolerances import TOLERANCES
 
 def build_problem(
     model: schema.ProblemModel,
-    document: YamlDocument,
+    reading: Reading,
     *,
     name: str,
-    folder: Path,
-    digest: Digest,
-    read_others: Callable[[Frame], Others],
+    read_others: Callable[[], Others],
 ) -> PlanningProblem:
     """The planning problem that a file describes.
 
     Args:
         model: The file's content, each value checked by itself.
-        document: The same with line numbers, for messages.
+        reading: The file. Its digest gets the bytes of the files that are named, in
+            the order of the calls below, which is that of `ProblemSource.files`: the
+            arm's URDF or the meshes that links carry, those of the obstacles, the
+            files of other arms and robots, those of the path.
         name: Name of the problem where the file gives none.
-        folder: Where relative mesh paths start.
         read_others: Reads the other arms and robots.
-        digest: Gets the bytes of the arm's URDF, if one is named, then those of the
-            meshes that links carry and those of the obstacles, in file order, then
-            those of the other arms and their trajectories, then those of the path's
-            files.
 
     Returns:
         The problem, in the base frame; [m], [rad].
@@ -58,68 +52,63 @@ def build_problem(
     Raises:
         InvalidFile: If values that are each in range make no sense together.
     """
-    frame = model.frame
-    known, each = (document, frame, folder, digest), Gathered()
-    self_clearance = float(frame.metres(model.required_self_clearance))
-
-    def read_arm() -> Manipulator:
-        arm = ArmBuilder(*known).build(model.manipulator)
-        _check_links_apart(arm, self_clearance, frame, document)
-        return arm
-
-    arm = each.get(read_arm)
-    obstacles = ObstacleBuilder(*known, arm.total_length if arm else None)
-    rest = each.get(lambda: obstacles.build_scene(model.obstacles, arm))
-    others = each.get(lambda: read_others(frame))
+    document, frame, digest = reading.document, reading.frame, reading.digest
+    collector = ErrorCollector()
+    arm = collector.attempt(_arm, model, reading)
+    obstacles = ObstacleBuilder(reading, arm.total_length if arm else None)
+    rest = collector.attempt(obstacles.build_scene, model.obstacles, arm)
+    others = collector.attempt(read_others)
     scene = None
     if rest is not None and others is not None:
         for file in others.files:
             read = others.contents.get(file)
             digest.update(read_bytes(file, limit=MAX_BYTES) if read is None else read)
-        scene = each.get(partial(joined, rest, others.bodies, document))
-    each.get(lambda: _check_ends(model, document))
-    tip_tolerance = each.get(lambda: _tip_tolerance(model, frame, document))
+        scene = collector.attempt(joined, rest, others.bodies, document)
+    collector.attempt(_check_ends, model, document)
+    tip_tolerance = collector.attempt(_tip_tolerance, model, frame, document)
     if arm and scene:
-        each.get(partial(_check_ignored, arm, scene.names, document))
-    asked = _asked_of(arm, model, known, each)
-    errors = each.get(lambda: _errors(model.errors, frame, (arm, scene), document))
-    each.end()
-    assert arm and scene and errors and tip_tolerance  # else what is wrong was told
+        collector.attempt(_check_ignored, arm, scene.names, document)
+    task = _task(model, arm, reading, collector)
+    errors = collector.attempt(_errors, model.errors, arm, scene, reading)
+    collector.raise_if_any()
+    assert arm and scene and errors  # what is None was raised
+    assert tip_tolerance is not None
     return PlanningProblem(
         name=model.name or name,
         manipulator=arm,
         scene=scene,
         required_clearance=float(frame.metres(model.required_clearance)),
         T_world_base=frame.pose,
-        required_self_clearance=self_clearance,
+        required_self_clearance=float(frame.metres(model.required_self_clearance)),
         tip_tolerance=tip_tolerance,
         max_row_change=_row_change(model),
         errors=errors,
-        **asked,
+        **task,
     )
 
 
-def _asked_of(
-    arm: Manipulator | None,
+def _arm(model: schema.ProblemModel, reading: Reading) -> Manipulator:
+    """The arm, its links far enough apart."""
+    arm = ArmBuilder(reading).build(model.manipulator)
+    _check_links_apart(arm, model, reading)
+    return arm
+
+
+def _task(
     model: schema.ProblemModel,
-    known: tuple[YamlDocument, Frame, Path, Digest],
-    each: Gathered,
+    arm: Manipulator | None,
+    reading: Reading,
+    collector: ErrorCollector,
 ) -> dict[str, Any]:
     """What an arm shall do: path, start, goal and scaling, as far as they are given."""
     if arm is None:
         return {}
-    paths = PathBuilder(*known, arm)
-    start, goal = partial(paths.start, at=("start",)), partial(paths.goal, at=("goal",))
-    scaling = partial(_scaling, arm=arm, document=known[0], frame=known[1])
-    reads: dict[str, tuple[Callable[[Any], Any], Any]] = {
-        "tip_path": (paths.build, model.tip_path),
-        "start": (start, model.start),
-        "goal": (goal, model.goal),
-        "scaling": (scaling, model.ratios),
-    }
+    paths, attempt = PathBuilder(reading, arm), collector.attempt
     return {
-        name: None if given is None else each.get(partial(read, given))
-        for name, (read, given) in reads.items()
+        "tip_path": model.tip_path and attempt(paths.build, model.tip_path),
+        "start": model.start and attempt(paths.start, model.start, ("start",)),
+        "goal": model.goal and attempt(paths.goal, model.goal, ("goal",)),
+        "scaling": model.ratios and attempt(_scaling, model.ratios, arm, reading),
     }
 
 
@@ -137,29 +126,28 @@ def joined(
 
 def _errors(
     model: ErrorsModel,
-    frame: Frame,
-    known: tuple[Manipulator | None, Scene | None],
-    document: YamlDocument,
+    arm: Manipulator | None,
+    scene: Scene | None,
+    reading: Reading,
 ) -> ErrorBox | None:
-    """The errors under which every clearance is asked for; None where nobody knows."""
-    (arm, scene), joint, each = known, model.joint_deg, Gathered()
+    """The errors that every clearance holds under; None where the scene is invalid."""
+    document, joint, collector = reading.document, model.joint_deg, ErrorCollector()
     if arm and isinstance(joint, list) and len(joint) != arm.n_links:
         problem = f"has {len(joint)} values, expected {arm.n_links}: one per joint"
-        each.note(document.invalid(("errors", "joint_deg"), problem))
+        collector.add(document.invalid(("errors", "joint_deg"), problem))
     errors = None
     if scene is not None:
-        errors = each.get(partial(model.box, frame.unit, scene, document))
-    each.end()
+        errors = collector.attempt(model.box, reading.frame.unit, scene, document)
+    collector.raise_if_any()
     if arm and errors:
         with document.naming(("errors",)):
             errors.angles(arm.n_links)
     return errors
 
 
-def _scaling(
-    model: schema.RatiosModel, arm: Manipulator, frame: Frame, document: YamlDocument
-) -> Scaling:
+def _scaling(model: schema.RatiosModel, arm: Manipulator, reading: Reading) -> Scaling:
     """What takes the place of constant ratios about the rail."""
+    document, frame = reading.document, reading.frame
     given = (model.values, model.scaling_centre, model.cylinder_radius)
     if sum(one is not None for one in given) != 1:
         problem = "expected one of values, scaling_centre and cylinder_radius"
@@ -228,9 +216,11 @@ def _check_ignored(
 
 
 def _check_links_apart(
-    arm: Manipulator, self_clearance: float, frame: Frame, document: YamlDocument
+    arm: Manipulator, model: schema.ProblemModel, reading: Reading
 ) -> None:
     """A link between two others must keep them apart while the arm is straight."""
+    frame = reading.frame
+    self_clearance = float(frame.metres(model.required_self_clearance))
     for i in range(1, arm.n_links - 1):
         needed = arm.radius_of(i) + arm.radius_of(i + 2) + self_clearance
         if not arm.link_lengths[i] > needed:
@@ -239,4 +229,5 @@ def _check_links_apart(
                 f"{frame.shown(needed)}: the radii of its neighbours and the "
                 "self-clearance, else the links on either side of it always touch"
             )
-            raise document.invalid(("manipulator", "link_lengths", i), problem)
+            at = ("manipulator", "link_lengths", i)
+            raise reading.document.invalid(at, problem)

@@ -1,7 +1,7 @@
 """Pydantic's complaints in this package's words: field, line, value, expectation."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Final, TypeVar, get_args
+from typing import Any, Final, ParamSpec, TypeVar, get_args
 
 from pydantic import Tag, ValidationError
 from pydantic.fields import FieldInfo
@@ -47,29 +47,32 @@ _WORDS: Final = {
 
 
 Model = TypeVar("Model", bound=FileModel)
+P = ParamSpec("P")
 T = TypeVar("T")
 
 
-class Gathered:
-    """What is wrong in the parts of one file, which are read one by one."""
+class ErrorCollector:
+    """Collects errors of the parts of one file, so that all are told at once."""
 
     def __init__(self) -> None:
         self._found: list[InvalidFile] = []
 
-    def get(self, read: Callable[[], T]) -> T | None:
-        """A part, or None where it is invalid, which is noted."""
+    def attempt(
+        self, read: Callable[P, T], *args: P.args, **kwargs: P.kwargs
+    ) -> T | None:
+        """What a call returns; None where it raises InvalidFile, which is kept."""
         try:
-            return read()
+            return read(*args, **kwargs)
         except InvalidFile as error:
-            self.note(error)
+            self.add(error)
         return None
 
-    def note(self, error: InvalidFile) -> None:
-        """Tell an error, and those that it carries, at the end."""
+    def add(self, error: InvalidFile) -> None:
+        """Keep an error, and those that it carries."""
         self._found += [error, *error.others]
 
-    def end(self) -> None:
-        """Tell all that was noted, if anything.
+    def raise_if_any(self) -> None:
+        """Raise what was kept.
 
         Raises:
             InvalidFile: The first of them, which carries the others.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vdsm_pin.errors import InvalidFile, UnknownName
-from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.frames import Reading
 from vdsm_pin.io.motion_field import MovableModel
 from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.others import OtherReader, Others, ReadRobot, files_of_arm
@@ -66,19 +66,14 @@ def read_problem(
     model = checked(document, ProblemModel)
     stem = "".join(c if c.isalnum() else "_" for c in path.stem[:100])
     digest, folder, of_others = hashlib.sha256(content), path.parent, list[Path]()
+    reading = Reading(document, model.frame, folder, digest)
 
-    def read_others(frame: Frame) -> Others:
-        found = OtherReader(document, frame, folder, read_robot).read(model.others)
+    def read_others() -> Others:
+        found = OtherReader(reading, read_robot).read(model.others)
         of_others.extend(found.files)
         return found
 
-    problem = build_problem(
-        *(model, document),
-        name=stem,
-        folder=folder,
-        digest=digest,
-        read_others=read_others,
-    )
+    problem = build_problem(model, reading, name=stem, read_others=read_others)
     named = tuple(_files_named(model, folder, of_others))
     of_obstacles = files_of_obstacles(model.obstacles, path.parent)
     source = ProblemSource(path, digest.hexdigest(), named, of_obstacles)

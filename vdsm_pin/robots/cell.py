@@ -10,7 +10,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.io.problem_errors import Gathered
+from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.source import path_of
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -235,12 +235,12 @@ def read_cell(path: str | Path) -> Cell:
     """
     file = read_cell_file(path_of(path))
     required, required_self = file.required
-    each = Gathered()
-    robot = each.get(lambda: read_robot(file.robot))
+    errors = ErrorCollector()
+    robot = errors.attempt(read_robot, file.robot)
     size, links = (robot.reach, _others(robot)) if robot else (None, [])
-    found = each.get(lambda: file.scene(size, links, read_other))
-    each.end()
-    assert robot and found  # else what is wrong was told
+    found = errors.attempt(file.scene, size, links, read_other)
+    errors.raise_if_any()
+    assert robot and found  # what is None was raised
     cell = Cell(
         robot=robot,
         scene=found.scene,

@@ -5,7 +5,7 @@ Nothing of geometry is worked out here; whoever reads a robot by itself begins h
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Final, NamedTuple, TypeAlias, get_args
@@ -14,11 +14,11 @@ from pydantic import Field
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.arm_schema import MAX_PARTS
-from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.frames import Frame, Reading
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import OtherReader, ReadRobot
 from vdsm_pin.io.problem_builder import joined
-from vdsm_pin.io.problem_errors import Gathered, checked
+from vdsm_pin.io.problem_errors import ErrorCollector, checked
 from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.problem_schema import AnyProblemModel, CoverKind, RobotModel
 from vdsm_pin.io.source import path_of, read_text
@@ -224,20 +224,20 @@ class CellFile:
         Raises:
             InvalidFile: If one breaks its contract, or is of a kind that is not judged.
         """
-        folder, frame, files = self.path.parent, self.frame, list[Path]()
-        builder = ObstacleBuilder(self.document, frame, folder, sha256(), robot_size)
-        others = OtherReader(self.document, frame, folder, read_robot)
-        each, at = Gathered(), ("obstacles",)
-        solids = each.get(lambda: builder.build_all(self.model.obstacles, at))
-        found = each.get(lambda: others.read(self.model.others))
+        folder, model, files = self.path.parent, self.model, list[Path]()
+        reading = Reading(self.document, self.frame, folder, sha256())
+        builder = ObstacleBuilder(reading, robot_size)
+        errors = ErrorCollector()
+        solids = errors.attempt(builder.build_all, model.obstacles, ("obstacles",))
+        found = errors.attempt(OtherReader(reading, read_robot).read, model.others)
         named = files_of_obstacles(self.model.obstacles, folder)
         more: tuple[Scene, Named] | None = Scene(), ()
         if self.model.scene is not None and robot_size is not None:
             files.append(folder / self.model.scene)
-            read = partial(read_scene_with_files, files[0], robot_size, links)
-            more = each.get(read)
-        each.end()
-        assert solids is not None and found and more  # else what is wrong was told
+            size = robot_size
+            more = errors.attempt(read_scene_with_files, files[0], size, links)
+        errors.raise_if_any()
+        assert solids is not None and found and more  # what is None was raised
         scene = joined(Scene(solids), more[0].obstacles, self.document, "scene")
         scene, named = joined(scene, found.bodies, self.document), (*named, *more[1])
         return CellScene(scene, (*files, *found.files), named)

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_quaternion
 from vdsm_pin.geometry.solids import Box, Cylinder, HalfSpace, Mesh, Sphere
-from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.frames import Frame, Reading
 from vdsm_pin.io.motion_field import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.places import Place
@@ -78,8 +78,8 @@ def _ours(
 ) -> tuple[Scene, tuple[tuple[str, Path], ...]]:
     model = checked(document, SceneModel)
     frame = Frame(model.length_unit, np.eye(3), np.zeros(3))
-    digest = hashlib.sha256()
-    builder = ObstacleBuilder(document, frame, path.parent, digest, robot_size)
+    reading = Reading(document, frame, path.parent, hashlib.sha256())
+    builder = ObstacleBuilder(reading, robot_size)
     scene = Scene(builder.build_all(model.obstacles, ("obstacles",)))
     return scene, files_of_obstacles(model.obstacles, path.parent)
 
