@@ -344,7 +344,7 @@ def test_a_limit_of_the_change_per_row_is_judged(tmp_path: Path) -> None:
         if good:
             assert judge(case).accepted
         else:
-            assert "a joint turns by 3 deg" in refused(case)
+            assert "a joint turns by 3°" in refused(case)
 
 
 @pytest.mark.parametrize("closed", [False, True])

@@ -193,7 +193,7 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
         [3126, 4000, 0],
         "lies 4000 mm from the rail, the arm is 3",
     ),
-    (("tip_path", "start"), [3126, 2200, 0], "needs a link angle psi of 44.73 deg"),
+    (("tip_path", "start"), [3126, 2200, 0], "needs a link angle psi of 44.73°"),
     (("tip_path", "start"), [9126, 0, 0], "base of the straight arm at x0 = 6000 mm"),
     (("tip_path", "start"), {"joints": STRAIGHT | {"x0": 5001}}, "joints.x0 (line 18)"),
     (
@@ -204,7 +204,7 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
     (
         ("tip_path", "start"),
         {"joints": STRAIGHT | {"theta_deg": [0] * 7 + [43]}},
-        "theta_deg[7] (line 36): is 43 deg, the joint's limit is 42.5 deg",
+        "theta_deg[7] (line 36): is 43°, the joint's limit is 42.5°",
     ),
     (
         ("tip_path", "start"),
@@ -212,7 +212,7 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
             "joints": STRAIGHT
             | {"alpha_deg": [0, 0, 40] + [0] * 5, "theta_deg": [40] * 8}
         },
-        "joints (line 17): has a link angle psi of 54.07 deg at joint 3, the limit",
+        "joints (line 17): has a link angle psi of 54.07° at joint 3, the limit",
     ),
     (("manipulator",), ARM | {"link_lengths": [500]}, "expected at least 2 entries"),
     (

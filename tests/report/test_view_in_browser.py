@@ -243,7 +243,7 @@ def test_the_read_out_says_what_is_proved_at_the_slider(report: Watched) -> None
     for k in (0, 60, 150, 199):
         page.evaluate("time => vdsm.motion.go(time)", k)
         lower = judged.profile.link_lower[min(k, 198)]
-        least = f"link {lower.argmin() + 1}"
+        least = f"link {judged.profile.link_upper[min(k, 198)].argmin() + 1}"
         text = page.locator("[data-clearance]").text_content()
         assert text.startswith(least)
         shown = float(text.split("at least ")[1].split(" ")[0])
@@ -277,6 +277,27 @@ def test_the_read_out_does_not_give_the_depth_of_what_meets(
     told = report.page.evaluate(script, charts)
     assert told["text"] == words
     assert told["short"] is (lower < 5.0)
+
+
+def test_the_read_out_names_who_comes_nearest_not_who_is_bounded_roughly(
+    report: Watched,
+) -> None:
+    """A far link whose lower bound is no more than the whole motion's."""
+    both = {"link": ("link 3", "link 6"), "obstacle": ("tank", "gate")}
+    charts = [
+        {
+            "id": f"clearance-{kind}",
+            "limits": [{"value": 5.0}],
+            "series": [
+                {"name": names[0], "values": packed(7.0), "upper": packed(900.0)},
+                {"name": names[1], "values": packed(7.0), "upper": packed(7.5)},
+            ],
+        }
+        for kind, names in both.items()
+    ]
+    script = "charts => new Clearances(charts, { place: () => [0] }).at(0)"
+    told = report.page.evaluate(script, charts)
+    assert told["text"] == "link 6 from gate: at least 7.000 mm"
 
 
 def test_plots_run_over_waypoints_or_the_way_of_the_tip(report: Watched) -> None:

@@ -648,10 +648,10 @@ def test_a_joint_that_goes_the_long_way_round_is_noted(tmp_path: Path) -> None:
     free = URDF.replace('type="revolute"', 'type="continuous"', 1)
     robot = read_robot(RobotFiles(write(tmp_path, "free.urdf", free)))
     for values, words in (
-        ((0, 3, -3, -2), "344 deg between waypoints 1 and 2: judged as it stands"),
+        ((0, 3, -3, -2), "344° between waypoints 1 and 2: judged as it stands"),
         (
             (0, 3, -3, 3),
-            "344 deg between waypoints 1 and 2, the first of 2 such turns: jud",
+            "344° between waypoints 1 and 2, the first of 2 such turns: jud",
         ),
         ((-1.5, 1.5, 4), ""),
         ((0,), ""),
@@ -664,7 +664,7 @@ def test_a_joint_that_goes_the_long_way_round_is_noted(tmp_path: Path) -> None:
     file = write(tmp_path, "t.csv", "turn_deg,slide_m\n0,0\n36000,0\n")
     many = read_motion(file, robot.joints, values=robot.values)
     assert many.q[1, 0] == pytest.approx(200.0 * np.pi)
-    assert "turns by 36000 deg between" in many.notes[0]
+    assert "turns by 36000° between" in many.notes[0]
     again = write(tmp_path, "again.csv", csv_text(many, robot))
     np.testing.assert_allclose(read_path(again, robot).knots, many.q, rtol=1e-15)
     file = write(tmp_path, "t.csv", "turn_rad,slide_m\n3,0\n-3,0\n")

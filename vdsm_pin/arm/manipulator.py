@@ -89,7 +89,7 @@ class Manipulator(ByValue):
         for name in ("max_link_angle", "max_joint_angle"):
             if not 0.0 < getattr(self, name) < np.pi / 2.0:
                 value = np.rad2deg(getattr(self, name))
-                message = f"{name} is {value} deg, expected above 0 and below 90"
+                message = f"{name} is {value}°, expected above 0° and below 90°"
                 raise InvalidInput(message)
         ends = np.asarray(self.base_range)
         finite = ends.shape == (2,) and np.isfinite(ends).all()

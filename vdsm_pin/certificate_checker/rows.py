@@ -75,7 +75,7 @@ class Rows:
             for points in columns[1:]:
                 fine = [q for both in times for q in part(points, *both)]
                 turn = reduce(arb.max, fine) - reduce(arb.min, fine)
-                claim(turn <= most + SLACK, "a joint turns by {} deg", _deg(turn))
+                claim(turn <= most + SLACK, "a joint turns by {}°", _deg(turn))
         low, high = arm.base_range
         x0, on_rail = columns[0], lambda q: low - SLACK <= q <= high + SLACK
         claim(always([x0], on_rail), "x0 is {} mm", MM * max(x0, key=abs))
@@ -87,10 +87,10 @@ class Rows:
         for i in range(1, len(columns), 2):
             both = columns[i : i + 2]
             for name, q in zip(("alpha", "theta"), both, strict=True):
-                told, largest = f"{name}{i // 2 + 1} is {{}} deg", max(q, key=abs)
+                told, largest = f"{name}{i // 2 + 1} is {{}}°", max(q, key=abs)
                 claim(always([q], lambda q: abs(q) <= most), told, _deg(largest))
             psi = [(a.cos() * b.cos()).acos() for a, b in zip(*both, strict=True)]
-            told = f"psi{i // 2 + 1} is {{}} deg"
+            told = f"psi{i // 2 + 1} is {{}}°"
             claim(always(both, in_cone), told, _deg(max(psi, key=float)))
 
     def _tips(self, rows: tuple[int, int], motion: Interval) -> None:
@@ -179,7 +179,7 @@ class Rows:
                 if worst <= limit:
                     continue
             for one, _ in ends:
-                claim(one <= limit, "the last link looks {} deg aside", _deg(one))
+                claim(one <= limit, "the last link looks {}° aside", _deg(one))
             claim(h > 2.0**-HALVINGS, "the last link may look aside within the errors")
             middle = (times[0] + times[1]) / 2
             slices += [(times[0], middle), (middle, times[1])]

@@ -100,15 +100,15 @@ class PostureBuilder(Builder):
             self.check_count((*at, name), values, n, "values, one per joint")
             for i, value in enumerate(values):
                 if not abs(value) <= limit + np.rad2deg(TOLERANCES.joint_limit):
-                    problem = f"is {value:g} deg, the joint's limit is {limit:g} deg"
+                    problem = f"is {value:g}°, the joint's limit is {limit:g}°"
                     raise self.invalid((*at, name, i), problem)
         alpha, theta = radians([model.alpha_deg, model.theta_deg])
         psi = link_angles(alpha, theta)
         worst = int(np.argmax(psi))
         if not psi[worst] <= self.arm.max_link_angle + TOLERANCES.joint_limit:
             problem = (
-                f"has a link angle psi of {np.rad2deg(psi[worst]):.4g} deg at joint "
-                f"{worst + 1}, the limit is {np.rad2deg(self.arm.max_link_angle):.4g}"
+                f"has a link angle psi of {np.rad2deg(psi[worst]):.4g}° at joint "
+                f"{worst + 1}, the limit is {np.rad2deg(self.arm.max_link_angle):.4g}°"
             )
             raise self.invalid(at, problem)
         return np.concatenate([[x0], np.column_stack([alpha, theta]).reshape(-1)])
@@ -141,8 +141,8 @@ class PostureBuilder(Builder):
         for name, (angle, limit) in angles.items():
             if not abs(angle) <= limit + TOLERANCES.joint_limit:
                 problem = (
-                    f"needs a {name} of {np.rad2deg(abs(angle)):.4g} deg of the "
-                    f"straight arm, the limit is {np.rad2deg(limit):.4g} deg{advice}"
+                    f"needs a {name} of {np.rad2deg(abs(angle)):.4g}° of the "
+                    f"straight arm, the limit is {np.rad2deg(limit):.4g}°{advice}"
                 )
                 raise self.invalid(at, problem)
         x0 = float(start[0]) - along

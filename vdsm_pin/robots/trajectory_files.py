@@ -132,7 +132,7 @@ def _long_ways(q: FloatArray, joints: Sequence[RobotJoint]) -> Iterator[str]:
             row, turn = int(jumps[0]), np.degrees(steps[jumps[0]])
             first = f", the first of {len(jumps)} such turns" if len(jumps) > 1 else ""
             yield (
-                f"joint {joint.name!r} turns by {turn:.0f} deg between waypoints {row} "
+                f"joint {joint.name!r} turns by {turn:.0f}° between waypoints {row} "
                 f"and {row + 1}{first}: judged as it stands, the long way round; "
                 "unwrap it if the robot takes the short way"
             )

@@ -159,7 +159,9 @@ def _cross_words(found: tuple[Cross, ...], on_circles: bool) -> tuple[str, ...]:
         f"takes {line}, to the side on which the arm passes, which keeps the motion "
         "continuous.",
         f"{len(moved)} of {len(found)} joints are moved; for {agree} of these both "
-        "rules take the same point.",
+        "rules take the same point."
+        if moved
+        else "No joint is inside here, so that none is moved.",
     )
 
 

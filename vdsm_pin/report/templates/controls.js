@@ -61,11 +61,12 @@ class Clearances {
         ({ name, values: unpack(values, Float32Array), upper: unpack(upper, Float32Array) })));
   }
 
-  least(series, k) {
+  // The one with the least lower bound, or with the least upper one: that comes nearest.
+  least(series, k, by = "value") {
     return series.reduce((best, one) => {
       const at = Math.min(k, one.values.length - 1);
-      const [value, upper] = [one.values[at], one.upper[at]];
-      return best === null || value < best.value ? { name: one.name, value, upper } : best;
+      const found = { name: one.name, value: one.values[at], upper: one.upper[at] };
+      return best === null || found[by] < best[by] ? found : best;
     }, null);
   }
 
@@ -79,8 +80,10 @@ class Clearances {
     if (link.value < 0 || meets) {
       return { text: `${link.name} ${meets ? "meets" : "may meet"} ${known ? obstacle.name : "an obstacle"}`, short };
     }
-    const from = known ? ` from ${obstacle.name}` : "";
-    return { text: `${link.name}${from}: at least ${lengthText(link.value / 1000, Math.floor)}`, short };
+    // What is far is bounded roughly: its lower bound may be less than that of the nearest.
+    const [near, other] = [this.least(this.links, k, "upper"), this.least(this.obstacles, k, "upper")];
+    const from = Math.abs(near.upper - other.upper) < 1e-3 ? ` from ${other.name}` : "";
+    return { text: `${near.name}${from}: at least ${lengthText(link.value / 1000, Math.floor)}`, short };
   }
 }
 

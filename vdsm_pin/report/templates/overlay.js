@@ -158,7 +158,9 @@ class Overlay {
     const middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
     const aside = along[0] >= 0 ? [along[1], -along[0]] : [-along[1], along[0]];
     this.pen.font = FONT;
-    const reach = 16 + (Math.abs(aside[0]) * this.pen.measureText(words).width) / 2;
-    this.text(words, middle[0] + reach * aside[0], middle[1] + reach * aside[1], colour, "center");
+    const half = this.pen.measureText(words).width / 2;
+    const reach = 16 + Math.abs(aside[0]) * half;
+    const across = Math.max(4 + half, Math.min(this.width - half - 4, middle[0] + reach * aside[0]));
+    this.text(words, across, middle[1] + reach * aside[1], colour, "center");
   }
 }
