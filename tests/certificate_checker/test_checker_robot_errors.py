@@ -19,9 +19,10 @@ from oracles.robot_certificates import BASES, VIRTUAL, Made, cell, text
 from oracles.robot_samples import Errors, Sampler
 from oracles.shortcuts import read_path
 
+from vdsm_pin.io.problem_file import read_document
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.robots.cell import read_cell
-from vdsm_pin.robots.files import CellScene, read_cell_file
+from vdsm_pin.robots.files import CellScene, cell_file
 
 Rng = np.random.Generator
 NOTHING = CellScene(Scene(), (), ())
@@ -133,7 +134,7 @@ def test_larger_errors_than_certified_are_refused(tmp_path: Path) -> None:
         made.texts["all.urdf"], made.cell["errors"] = urdf, ERRORS
         change(made)
         made.write()
-        source = read_cell_file(made.files[0]).source(named, NOTHING)
+        source = cell_file(read_document(made.files[0])).source(named, NOTHING)
         lines[0]["problem_sha256"] = source.sha256
         outcome = made.check(lines, fits=False)
         assert not outcome.accepted, what

@@ -18,16 +18,16 @@ def read_problem(name_or_path: str | Path) -> PlanningProblem:
 
     Raises:
         InvalidFile: If the file or its content breaks the contract of docs/files.md.
-        ProblemOfRobot: If it has `robot` in place of `manipulator`.
 
     Example:
         >>> read_problem("paper/obs1").manipulator.n_links
         8
     """
-    return problem_file.read_problem(name_or_path, _read_robot)
+    return problem_file.read_problem(name_or_path, read_robot)
 
 
-def _read_robot(one: OtherFile) -> Others:
+def read_robot(one: OtherFile) -> Others:
+    """Another robot of a problem."""
     from vdsm_pin.robots.other_robots import read_other  # few problems have any
 
     return read_other(one)

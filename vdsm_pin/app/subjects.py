@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from vdsm_pin.app.arm_subject import ArmSubject
 from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions
-from vdsm_pin.app.problems import read_problem
-from vdsm_pin.io.problem_file import ProblemOfRobot
+from vdsm_pin.app.problems import read_robot
+from vdsm_pin.io.problem_file import arm_problem, read_document
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.brackets import ClearanceSink
@@ -135,12 +135,13 @@ def read_problem_or_cell(name_or_path: str | Path) -> ProblemOrCell:
     Raises:
         InvalidFile: If the file or one that it names breaks its contract.
     """
-    try:
-        return read_problem(name_or_path)
-    except ProblemOfRobot as error:
-        from vdsm_pin.robots.cell import read_cell
+    file = read_document(name_or_path)
+    if not file.is_of_robot:
+        return arm_problem(file, read_robot)
+    from vdsm_pin.robots.cell import cell_of_file
+    from vdsm_pin.robots.files import cell_file
 
-        return read_cell(error.file)
+    return cell_of_file(cell_file(file))
 
 
 def subject_of(problem: ProblemOrCell, options: MotionOptions = NO_OPTIONS) -> Subject:

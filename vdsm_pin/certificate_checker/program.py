@@ -11,7 +11,6 @@ import hashlib
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -23,9 +22,9 @@ from vdsm_pin.certificate_checker.balls import Rejected, claim
 from vdsm_pin.certificate_checker.claims import Clearances
 from vdsm_pin.certificate_checker.robot import Robot, other_robot
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
+from vdsm_pin.io.problem_file import arm_problem, read_document
 from vdsm_pin.io.source import bounded_lines, check_is_file_or_bag, check_unchanged
-from vdsm_pin.robots.files import read_cell_file
+from vdsm_pin.robots.files import cell_file
 from vdsm_pin.text import printable, show_everything
 
 VERSION: Final = 9
@@ -104,15 +103,14 @@ class _Run:
         self, lines: Iterator[dict[str, Any]], problem: Path, trajectory: Path
     ) -> tuple[str, list[str]]:
         """What is judged, and what was assumed."""
-        try:
-            asks: Any = partial(Arm, read_problem(problem, other_robot))
-        except ProblemOfRobot:
-            asks = partial(Robot, read_cell_file(problem))
+        file = read_document(problem)
+        robot = file.is_of_robot
+        stated: Any = cell_file(file) if robot else arm_problem(file, other_robot)
         header = next(lines, {})
         version, by = header.get("vdsm_certificate"), header.get("versions", {})
         told = f"is of version {version}, as vdsm-pin {by.get('vdsm_pin')} writes and "
         claim(version == VERSION, told + f"reads it; expected {VERSION}")
-        asked = asks(header, trajectory)
+        asked: Any = (Robot if robot else Arm)(stated, header, trajectory)
         check_unchanged(trajectory, header["trajectory_sha256"])
         expected = [pair.names for pair in asked.pairs]
         claim(header["pairs"] == expected, "the pairs are not those of the problem")

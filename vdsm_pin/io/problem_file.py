@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from vdsm_pin.errors import InvalidFile, UnknownName
 from vdsm_pin.io.frames import Reading
@@ -16,7 +16,7 @@ from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import checked
 from vdsm_pin.io.problem_schema import ProblemModel
 from vdsm_pin.io.source import check_is_file, decode, path_of, read_bytes
-from vdsm_pin.io.yaml_reader import read_yaml
+from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
@@ -27,8 +27,38 @@ SCHEMA_DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 _FOLDER: Final = Path(__file__).resolve().parent.parent / "problems"
 
 
-class ProblemOfRobot(InvalidFile):
-    """The problem is about a robot of a URDF, which `robots.cell` reads."""
+class ProblemDocument(NamedTuple):
+    """A problem file, of an arm or of any other robot.
+
+    Args:
+        path: The file.
+        content: Its bytes.
+        yaml: What they say.
+    """
+
+    path: Path
+    content: bytes
+    yaml: YamlDocument
+
+    @property
+    def is_of_robot(self) -> bool:
+        """Whether it has `robot` in place of `manipulator`: `robots.cell` reads it."""
+        return isinstance(self.yaml.data, dict) and "robot" in self.yaml.data
+
+
+def read_document(name_or_path: str | Path) -> ProblemDocument:
+    """The file of a built-in name or a path as YAML.
+
+    Raises:
+        InvalidFile: If it cannot be read, or is no YAML.
+    """
+    path = find_problem(name_or_path)
+    content = read_bytes(path, limit=MAX_PROBLEM_BYTES)
+    text = decode(content, path)
+    if text.lstrip().startswith(("<?xml", "<robot", "<!--")):
+        what = "is XML, expected a problem file, which may name a URDF"
+        raise InvalidFile(file=path, problem=what)
+    return ProblemDocument(path, content, read_yaml(text, file=path))
 
 
 def read_problem(
@@ -45,24 +75,25 @@ def read_problem(
 
     Raises:
         InvalidFile: If the file or its content breaks the contract of docs/files.md.
-        ProblemOfRobot: If it has `robot` in place of `manipulator`.
-
     """
-    path = find_problem(name_or_path)
-    content = read_bytes(path, limit=MAX_PROBLEM_BYTES)
-    text = decode(content, path)
-    if text.lstrip().startswith(("<?xml", "<robot", "<!--")):
-        what = "is XML, expected a problem file, which may name a URDF"
-        raise InvalidFile(file=path, problem=what)
-    document = read_yaml(text, file=path)
-    if isinstance(document.data, dict) and "robot" in document.data:
-        line = document.line(("robot",))
-        where = "robot" if line is None else f"robot (line {line})"
-        others = (
-            "verify, repair, view, export, convert, batch --trajectories and read_cell"
+    return arm_problem(read_document(name_or_path), read_robot)
+
+
+def arm_problem(
+    file: ProblemDocument, read_robot: ReadRobot | None = None
+) -> PlanningProblem:
+    """The problem of a snake arm that a file states.
+
+    Raises:
+        InvalidFile: As `read_problem`; if the file is of another robot, too.
+    """
+    path, content, document = file
+    if file.is_of_robot:
+        what = (
+            "makes this a problem of a robot, and only snake arms are handled here; "
+            "expected manipulator. `vdsm verify` and `read_cell` take robots"
         )
-        what = f"is for {others} only; expected manipulator"
-        raise ProblemOfRobot(file=path, where=where, problem=what)
+        raise document.invalid(("robot",), what)
     model = checked(document, ProblemModel)
     stem = "".join(c if c.isalnum() else "_" for c in path.stem[:100])
     digest, folder, of_others = hashlib.sha256(content), path.parent, list[Path]()

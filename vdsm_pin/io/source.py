@@ -250,14 +250,23 @@ def sha256_of_file(path: Path) -> str:
     """SHA-256 of a file's bytes, or of those in a bag's folder, in hexadecimal.
 
     Raises:
-        InvalidFile: If it is no regular file: a pipe or a device may have no end.
+        InvalidFile: If a file is not regular or cannot be read.
     """
     digest = hashlib.sha256()
     for one in files_in(path):
-        check_is_file(one)
-        with one.open("rb") as file:
-            hashlib.file_digest(file, lambda: digest)
+        add_file(one, digest)
     return digest.hexdigest()
+
+
+def add_file(path: Path, digest: "hashlib._Hash") -> None:
+    """Add the bytes of a file to a hash, a block at a time.
+
+    Raises:
+        InvalidFile: If it is no regular file: a pipe or a device may have no end.
+    """
+    check_is_file(path)
+    with readable(path), path.open("rb") as file:
+        hashlib.file_digest(file, lambda: digest)
 
 
 def check_unchanged(path: Path, digest: str) -> None:

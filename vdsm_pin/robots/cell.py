@@ -11,12 +11,12 @@ import numpy as np
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.io.problem_errors import ErrorCollector
-from vdsm_pin.io.source import path_of
+from vdsm_pin.io.problem_file import read_document
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import PairTable
-from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
+from vdsm_pin.robots.files import CellFile, Named, RobotFiles, cell_file, source_of
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.other_robots import read_other
 from vdsm_pin.robots.scene_files import read_scene_with_files
@@ -233,7 +233,11 @@ def read_cell(path: str | Path) -> Cell:
     Raises:
         InvalidFile: If the file or one that it names breaks its contract.
     """
-    file = read_cell_file(path_of(path))
+    return cell_of_file(cell_file(read_document(path)))
+
+
+def cell_of_file(file: CellFile) -> Cell:
+    """The robot of a problem file that was read already: as `read_cell`."""
     required, required_self = file.required
     errors = ErrorCollector()
     robot = errors.attempt(read_robot, file.robot)

@@ -19,14 +19,14 @@ from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.others import OtherReader, ReadRobot
 from vdsm_pin.io.problem_builder import joined
 from vdsm_pin.io.problem_errors import ErrorCollector, checked
-from vdsm_pin.io.problem_file import files_of_obstacles
+from vdsm_pin.io.problem_file import ProblemDocument, files_of_obstacles
 from vdsm_pin.io.problem_schema import AnyProblemModel, CoverKind, RobotModel
-from vdsm_pin.io.source import path_of, read_text
-from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
+from vdsm_pin.io.source import add_file, path_of
+from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.robots.scene_files import MAX_BYTES, read_scene_with_files
+from vdsm_pin.robots.scene_files import read_scene_with_files
 
 Named: TypeAlias = tuple[tuple[str, Path], ...]
 """Names of obstacles that have a file of their own, with it."""
@@ -270,14 +270,13 @@ class CellScene(NamedTuple):
     of_obstacles: Named
 
 
-def read_cell_file(path: Path) -> CellFile:
-    """A problem file with `robot` in place of `manipulator`.
+def cell_file(file: ProblemDocument) -> CellFile:
+    """What a problem file with `robot` in place of `manipulator` states.
 
     Raises:
         InvalidFile: If the file breaks its contract.
     """
-    document = read_yaml(read_text(path, limit=MAX_BYTES), file=path)
-    data = document.data
+    path, document, data = file.path, file.yaml, file.yaml.data
     if isinstance(data, dict) and "manipulator" in data and "robot" not in data:
         problem = "is of a snake arm, which read_problem reads; expected robot"
         raise InvalidFile(file=path, where="manipulator", problem=problem)
@@ -288,5 +287,5 @@ def source_of(files: tuple[Path, ...], of_obstacles: Named) -> ProblemSource:
     """The files that a cell was read from, the robot or the problem first."""
     read, digest = (*files, *(file for _, file in of_obstacles)), sha256()
     for file in read:
-        digest.update(file.read_bytes())
+        add_file(file, digest)
     return ProblemSource(read[0], digest.hexdigest(), read[1:], of_obstacles)
