@@ -64,7 +64,9 @@ class CoalCloud:
         self._reach = np.linalg.norm(high - self._middle, axis=1) + reach
 
     def measure(self, request: Any, result: Any, geometry: Any, pose: Any) -> float:
-        """The distance of the nearest body; arguments are those of `_answer`; [m]."""
+        """The distance of the nearest body; arguments as for `measure`; [m]."""
+        import coal
+
         geometry.computeLocalAABB()
         box, best = geometry.aabb_local, math.inf
         bounds = _gaps(box, pose, self._middle) - self._reach
@@ -77,7 +79,7 @@ class CoalCloud:
                 if each[i] > max(best, 0.0):
                     break
                 body = placed(self._shape, group[i], self._rotation)
-                best = min(best, _answer(request, result, geometry, pose, body))
+                best = min(best, _answer(coal, request, result, geometry, pose, body))
         return best
 
 
@@ -202,21 +204,25 @@ def measure(
     result = coal.DistanceResult() if result is None else result
     if isinstance(bodies, CoalCloud):
         return bodies.measure(request, result, geometry, pose)
-    answers = (_answer(request, result, geometry, pose, body) for body in bodies)
-    return min(answers, default=math.inf)
+    best = math.inf
+    for body in bodies:
+        best = min(best, _answer(coal, request, result, geometry, pose, body))
+    return best
 
 
 def _answer(
-    request: Any, result: Any, geometry: Any, pose: Any, body: CoalBody
+    coal: Any, request: Any, result: Any, geometry: Any, pose: Any, body: CoalBody
 ) -> float:
     """Coal's distance of two bodies; -inf where its answer is not usable; [m]."""
-    import coal
-
     result.clear()
-    distance = coal.distance(geometry, pose, body.geometry, body.pose, request, result)
-    near, far = result.getNearestPoint1(), result.getNearestPoint2()
-    gap = math.dist(near.tolist(), far.tolist())
-    return float(distance) if _usable(distance, result.min_distance, gap) else -math.inf
+    distance: float = coal.distance(
+        geometry, pose, body.geometry, body.pose, request, result
+    )
+    gap = distance
+    if distance > 0.0:
+        near, far = result.getNearestPoint1(), result.getNearestPoint2()
+        gap = math.dist(near.tolist(), far.tolist())
+    return distance if _usable(distance, result.min_distance, gap) else -math.inf
 
 
 def _usable(distance: float, stored: float, gap: float) -> bool:
@@ -247,10 +253,11 @@ def measure_each(calls: Iterable[Call], count: int) -> FloatArray:
     import coal
 
     request, result = distance_request(), coal.DistanceResult()
-    found, pose = np.full(count, np.nan), coal.Transform3s()
+    found, pose = [math.nan] * count, coal.Transform3s()
     for pair, shape, turn, shift, bodies in calls:
         pose.setTransform(turn, shift)
         if bodies:
             told = measure(request, shape, pose, bodies, result)
-            found[pair] = np.fmin(found[pair], told)
-    return found
+            if not found[pair] <= told:
+                found[pair] = told
+    return np.array(found)
