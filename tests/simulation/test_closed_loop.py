@@ -182,3 +182,24 @@ def test_a_folder_holds_what_the_verifier_takes(
     less = told.executed.model_copy(update={"min_clearance_m": 0.0101369})
     show_simulation(told.model_copy(update={"executed": less}), tmp_path)
     assert "10.136 mm" in capsys.readouterr().out  # what is proved is rounded down
+
+
+def test_places_on_a_path_are_not_asked_for_where_there_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def reached(_: object, planned: vp.Trajectory, __: object) -> None:
+        message = f"{planned.n_samples} rows simulated"
+        raise InvalidInput(message)
+
+    monkeypatch.setattr("vdsm_pin.simulation.folder.simulate", reached)
+    with_path, file = read_problem("paper/obs3"), tmp_path / "t.csv"
+    vp.write_trajectory(file, bending(10, angle=0.02))
+    lines = [line.split(",") for line in file.read_text().splitlines()]
+    file.write_text("\n".join(",".join([row[0], *row[3:]]) for row in lines) + "\n")
+    assert lines[0][:4] == ["waypoint", "on_path", "path_m", "x0_m"]
+    order = SimulationOrder(with_path, file, tmp_path / "out", Settings())
+    with pytest.raises(InvalidInput, match="has no column 'on_path'"):
+        simulate_to_folder(order)
+    without = replace(order, problem=replace(with_path, tip_path=None))
+    with pytest.raises(InvalidInput, match="10 rows simulated"):
+        simulate_to_folder(without)

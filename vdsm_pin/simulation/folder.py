@@ -132,7 +132,8 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
         raise InvalidInput(message)
     check_is_file(order.trajectory)
     digest = sha256_of_file(order.trajectory)
-    planned = read_trajectory(order.trajectory, problem.manipulator, "linear")
+    arm, asked = problem.manipulator, problem.tip_path is not None
+    planned = read_trajectory(order.trajectory, arm, "linear", places=asked)
     found = simulate(problem.manipulator, planned, order.settings)
     file = summary(problem, planned, found, order.settings, digest)
     check_unchanged(order.trajectory, digest)
