@@ -39,14 +39,18 @@ class VdsmError(Exception):
     """Base of all errors raised on purpose; as text one line that can be shown.
 
     Attributes:
+        notes: What was found of the problem, told before the message.
+        history: What was tried before, told after the message.
         page: A page that was written and tells more.
     """
 
+    notes: tuple[str, ...] = ()
+    history: tuple[str, ...] = ()
     page: Path | None = None
 
     def __str__(self) -> str:
-        """The message, which may quote a file: every sign of it can be seen."""
-        return printable(super().__str__())
+        """All of it, which may quote a file: every sign of it can be seen."""
+        return printable("; ".join([*self.notes, super().__str__(), *self.history]))
 
 
 class InvalidInput(VdsmError):

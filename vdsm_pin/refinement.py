@@ -147,8 +147,8 @@ def _plan_at_rest(
             found = plan_with(known.problem, clearance, margins.copy())
             plan = _chosen(problem, found, deadline)
         except (Infeasible, OutOfTime) as error:
-            before = [f"before that {_story(rounds)}"] if rounds else []
-            error.args = ("; ".join([*known.notes, str(error), *before]),)
+            error.notes = known.notes
+            error.history = (f"before that {_story(rounds)}",) if rounds else ()
             raise
         adjustments = by_coal(plan, margins, deadline)
         if adjustments:

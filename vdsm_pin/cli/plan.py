@@ -1,10 +1,12 @@
 """`vdsm plan`."""
 
 import time
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 
 import typer
 
+from vdsm_pin.cli.ending import fail
 from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
@@ -18,7 +20,7 @@ from vdsm_pin.cli.options import (
     family,
     grouped,
 )
-from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime, VdsmError
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -51,38 +53,20 @@ def plan(
     """
     from vdsm_pin.app.problems import read_problem
     from vdsm_pin.app.workflow import plan_to_folder
-    from vdsm_pin.kept import default_limit, is_cold, note_planned
+    from vdsm_pin.kept import note_planned
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
 
-    box, cold = errors.box(), time_limit is None and is_cold()
-    limit = default_limit() if time_limit is None else time_limit
-    deadline, begin = Deadline.after(limit), time.monotonic()
-    try:
+    box = errors.box()
+    with _planning(time_limit) as deadline:
         with enforced(deadline, grace=0.0):
             asked = read_problem(problem).under(box)
-        told = nullcontext() if any(answer) else shown(limit=limit)
+        told = nullcontext() if any(answer) else shown(limit=deadline.limit)
         with enforced(deadline), told:
             file = plan_to_folder(asked, strategy, out, context.obj, deadline)
         if asked.scene.obstacles:  # without any, little is compiled
             note_planned()
-    except OutOfTime as error:  # which tells its time itself
-        compiled = "; compiling took part of it, the next plan is quicker"
-        if cold:
-            note_planned()
-        said = f"no plan found: {error}{compiled if cold else ''}{_see(error)}"
-        error.args = (said,)
-        raise
-    except NoPlanFound as error:
-        note_planned()
-        spent = time.monotonic() - begin
-        said = f"no plan found: {error}; searched for {spent:.1f} s{_see(error)}"
-        error.args = (said,)
-        raise
-    except Infeasible as error:
-        error.args = (f"{error}{_see(error)}",)
-        raise
     if answer.as_json:
         typer.echo(file.text(), nl=False)
     elif not answer.quiet:
@@ -90,6 +74,27 @@ def plan(
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
 
 
-def _see(error: VdsmError) -> str:
-    """Names the page that tells of an error, where there was time to write it."""
-    return f"; see {error.page}" if error.page else ""
+@contextmanager
+def _planning(limit: float | None) -> Iterator[Deadline]:
+    """Plan within a limit; None for the default, longer where code is yet to be made.
+
+    Where there is no plan, the command ends and says so.
+    """
+    from vdsm_pin.kept import default_limit, is_cold, note_planned
+
+    compiles, begin = limit is None and is_cold(), time.monotonic()
+    try:
+        yield Deadline.after(default_limit() if limit is None else limit)
+    except (Infeasible, OutOfTime) as error:
+        said = [str(error)]
+        if isinstance(error, OutOfTime | NoPlanFound):
+            said = [f"no plan found: {error}"]
+        if isinstance(error, OutOfTime) and compiles:
+            said.append("compiling took part of it, the next plan is quicker")
+            note_planned()
+        if isinstance(error, NoPlanFound):
+            said.append(f"searched for {time.monotonic() - begin:.1f} s")
+            note_planned()
+        if error.page:
+            said.append(f"see {error.page}")
+        fail(Infeasible("; ".join(said)), NOT_PASSED)
