@@ -120,7 +120,6 @@ def verification(
         least=least(len(pairs)),
         coverage=0.873,
         undrawn=np.array([[1.0, 1.5]]),
-        tip_deviation=2e-6,
         joint_error=joint_error,
     )
 

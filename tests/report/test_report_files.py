@@ -85,7 +85,6 @@ def test_undefined_numbers_become_null_and_never_pass() -> None:
         approaches=(),
         profile=judged.profile,
         least=judged.least,
-        tip_deviation=math.nan,
         coverage=math.nan,
         undrawn=np.zeros((0, 2)),
         joint_error=math.nan,

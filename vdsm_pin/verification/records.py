@@ -306,8 +306,6 @@ class ArmVerification(Verification):
     Args:
         problem: What was asked.
         trajectory: What was judged.
-        tip_deviation: Bound of the distance from the desired path on the intervals
-            that draw it; 0 where there is none; [m].
         coverage: Proved part of the desired path that is drawn, 0 to 1; NaN where there
             is none; [-].
         undrawn: Stretches not drawn, arc lengths from and to, shape (k, 2); [m].
@@ -315,7 +313,6 @@ class ArmVerification(Verification):
 
     problem: PlanningProblem
     trajectory: Trajectory
-    tip_deviation: float
     coverage: float
     undrawn: FloatArray
 

@@ -116,7 +116,6 @@ def verify(
         checks=tuple(checks),
         approaches=tuple(log.approaches.values()),
         profile=found.profile,
-        tip_deviation=tip.deviation,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
         joint_error=survived[0],
