@@ -353,7 +353,7 @@ def test_bounds_are_kept_where_they_fit(
         proof: Any = SimpleNamespace(
             least=SimpleNamespace(lower=rng.normal(size=8)),
             sent=sent,
-            motion=SimpleNamespace(n_intervals=5),
+            motion=SimpleNamespace(n_trajectory_intervals=5),
         )
         found = sink.proved(proof)
         assert np.array_equal(found.least, proof.least.lower)
@@ -656,9 +656,9 @@ def test_sinks_hear_of_every_interval_once(monkeypatch: pytest.MonkeyPatch) -> N
         proof = prove_clearance(asked, motion, ErrorBox(), (chunks.append,))
         monkeypatch.setattr(clearance, "CHUNK", 7)
         assert max(len(chunk.lower) for chunk in chunks) == min(most, max(1, rows - 1))
-        assert proof.sent == proof.motion.n_intervals == max(1, rows - 1)
+        assert proof.sent == proof.motion.n_trajectory_intervals == max(1, rows - 1)
         heard = [c.first_interval + k for c in chunks for k in range(len(c.lower))]
-        assert heard == [*range(proof.motion.n_intervals)]
+        assert heard == [*range(proof.motion.n_trajectory_intervals)]
         lower = np.concatenate([chunk.lower for chunk in chunks])
         assert (lower.min(axis=0) >= proof.least.lower).all()
         assert (lower.min(axis=0) <= proof.least.upper).all()
@@ -791,7 +791,9 @@ def test_no_ball_is_looked_for_when_time_is_over() -> None:
         points,
     )
     path = Path(np.zeros((2, 1)))
-    motion: Any = SimpleNamespace(asked=None, path=path, span=np.array([0.0, 1.0]))
+    motion: Any = SimpleNamespace(
+        asked=None, path=path, span_on_path=np.array([0.0, 1.0])
+    )
     found = clearances.with_depths(motion, least, deadline=Deadline.after(0.0))
     for name in (one.name for one in fields(least)):
         np.testing.assert_array_equal(getattr(found, name), getattr(least, name))
@@ -818,7 +820,7 @@ def test_common_balls_are_looked_for_in_few_pairs_of_those_that_meet(
     monkeypatch.setattr(clearances, "_moments", lambda *_: iter([0.0]))
     monkeypatch.setattr(clearances, "common_ball", noted)
     asked = SimpleNamespace(ball=lambda k: 0.1 * (k % 3 == 1))
-    motion: Any = SimpleNamespace(asked=asked, span=np.array([0.0, 1.0]))
+    motion: Any = SimpleNamespace(asked=asked, span_on_path=np.array([0.0, 1.0]))
     clearances.with_depths(motion, LeastClearances(*rows))
     first = sorted(range(0, n, 3), key=lambda k: upper[k])
     assert looked == first[: clearances.MOST]

@@ -271,7 +271,7 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
     )
     monkeypatch.setattr(clearances, "seeming_depth", lambda *_: -1.0)
     asking = replace(proof.motion, asked=held, path=path)
-    given = replace(proof, motion=asking, inner=least, counts=counts)
+    given = replace(proof, motion=asking, on_path=least, counts=counts)
     found = given.with_depths()
     wanted, rest = [upper.copy(), points.copy()], counts.copy()
     moments = numbers + shares
@@ -293,12 +293,12 @@ def test_what_meets_is_refuted_where_a_ball_in_both_is_found(
     assert [k for k, _ in asked] == [k for k, _ in expected]
     np.testing.assert_allclose([at for _, at in asked], [at for _, at in expected])
     np.testing.assert_array_equal(found.counts, rest)
-    np.testing.assert_array_equal(found.inner.verdict, verdicts_of(rest))
-    np.testing.assert_array_equal(found.inner.lower, lower)
-    np.testing.assert_array_equal(found.inner.upper, wanted[0])
-    np.testing.assert_allclose(found.inner.interval + found.inner.share, moments)
-    np.testing.assert_allclose(found.inner.link_point, wanted[1][0])
-    np.testing.assert_allclose(found.inner.other_point, wanted[1][1])
+    np.testing.assert_array_equal(found.on_path.verdict, verdicts_of(rest))
+    np.testing.assert_array_equal(found.on_path.lower, lower)
+    np.testing.assert_array_equal(found.on_path.upper, wanted[0])
+    np.testing.assert_allclose(found.on_path.interval + found.on_path.share, moments)
+    np.testing.assert_allclose(found.on_path.link_point, wanted[1][0])
+    np.testing.assert_allclose(found.on_path.other_point, wanted[1][1])
     assert expected and (rest != counts).any()
 
 

@@ -110,7 +110,7 @@ def _coal(
     Returns:
         The check, and the distances, NaN where there is none, shape (n_pairs,); [m].
     """
-    asked, least, motion = cell.asked, proof.inner, proof.motion
+    asked, least, motion = cell.asked, proof.on_path, proof.motion
     table, found = asked.table, np.full(asked.table.size, nan)
     seen = np.flatnonzero(np.isfinite(least.upper))
     when = least.interval[seen] + least.share[seen]

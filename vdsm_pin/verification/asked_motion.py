@@ -65,12 +65,12 @@ class AskedMotion:
         return self.asked.question.under(self.asked.box(self.errors))
 
     @property
-    def n_intervals(self) -> int:
+    def n_trajectory_intervals(self) -> int:
         """Intervals of the trajectory."""
         return len(self.knots.first) - 1
 
     @property
-    def span(self) -> FloatArray:
+    def span_on_path(self) -> FloatArray:
         """From when to when it goes, in knots of the path."""
         return np.array([0.0, self.path.n_intervals])
 

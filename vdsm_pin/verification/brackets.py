@@ -43,7 +43,8 @@ class LeastClearances:
     """The least clearance of every pair over the whole motion.
 
     Args:
-        interval: Where the upper bound was found, shape (n_pairs,).
+        interval: Where the upper bound was found, of the trajectory or of the joint
+            path: the holder says which; shape (n_pairs,).
         share: Its place in the interval, 0 to 1, shape (n_pairs,); [-].
         lower: Proved lower bound over the motion, shape (n_pairs,); [m].
         upper: Proved upper bound, shape (n_pairs,); [m].

@@ -57,9 +57,9 @@ class ClearanceProof:
         motion: What is asked.
         counts: Intervals certified, refuted and undecided, shape (n_pairs, 3); knots of
             what carries obstacles end intervals too.
-        inner: The least clearances, in intervals of the path.
-        weakest: Of each pair the interval of the path with its least lower bound, shape
-            (n_pairs,).
+        on_path: The least clearances, in intervals of the path.
+        weakest_on_path: Of each pair the interval of the path with its least lower
+            bound, shape (n_pairs,).
         profile: Brackets along the motion.
         late: Whether the time was over before all was judged.
         sent: Intervals whose brackets the sinks received: all, if there was time.
@@ -67,8 +67,8 @@ class ClearanceProof:
 
     motion: AskedMotion
     counts: IntArray
-    inner: LeastClearances
-    weakest: IntArray
+    on_path: LeastClearances
+    weakest_on_path: IntArray
     profile: ClearanceProfile
     late: bool
     sent: int
@@ -80,8 +80,8 @@ class ClearanceProof:
 
     @cached_property
     def least(self) -> LeastClearances:
-        """The least bounds of every pair, with their witnesses."""
-        return in_rows(self.inner, self.motion.knots)
+        """The least clearances, in intervals of the trajectory."""
+        return in_rows(self.on_path, self.motion.knots)
 
     def counterexamples(
         self, deadline: Deadline = NO_LIMIT
@@ -91,7 +91,8 @@ class ClearanceProof:
         Raises:
             OutOfTime: If the time is over.
         """
-        return find_counterexamples(self.motion, self.inner, self.weakest, deadline)
+        least, weakest = self.on_path, self.weakest_on_path
+        return find_counterexamples(self.motion, least, weakest, deadline)
 
     def with_depths(self, deadline: Deadline = NO_LIMIT) -> "ClearanceProof":
         """The same with what balls in both bodies of pairs prove.
@@ -99,12 +100,12 @@ class ClearanceProof:
         No depth is measured of bodies that nothing grows: where they meet their
         clearance is 0 at most, which refutes no required clearance of 0.
         """
-        found = with_depths(self.motion, self.inner, deadline=deadline)
-        lost = (self.inner.verdict == UNDECIDED) & (found.verdict == REFUTED)
+        found = with_depths(self.motion, self.on_path, deadline=deadline)
+        lost = (self.on_path.verdict == UNDECIDED) & (found.verdict == REFUTED)
         counts = self.counts.copy()
         counts[lost, REFUTED] += 1
         counts[lost, UNDECIDED] -= 1
-        return replace(self, inner=found, counts=frozen(counts, np.int64))
+        return replace(self, on_path=found, counts=frozen(counts, np.int64))
 
 
 def _chunk(
@@ -200,8 +201,8 @@ def prove_motion(
     return ClearanceProof(
         motion=motion,
         counts=told.counts,
-        inner=least_clearances(asked, told),
-        weakest=told.lower_interval,
+        on_path=least_clearances(asked, told),
+        weakest_on_path=told.lower_interval,
         profile=profile_of(told.profile, told.stride, motion.knots, n_links),
         late=not in_time,
         sent=sent,

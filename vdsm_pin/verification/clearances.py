@@ -62,7 +62,7 @@ def with_depths(
         deadline: When to leave it at what was found.
     """
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
-    span = motion.span if span is None else span
+    span = motion.span_on_path if span is None else span
     changed = dict[int, tuple[Any, ...]]()
     lost = least.verdict == REFUTED
     known = np.flatnonzero(near & lost).tolist()

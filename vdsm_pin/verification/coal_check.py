@@ -72,7 +72,9 @@ class LowersSink:
         least = proof.least.lower
         column = np.full(len(least), -1)
         lower = np.zeros((1, 1))
-        whole = proof.sent == proof.motion.n_intervals and self._size <= COMPARED
+        whole = (
+            proof.sent == proof.motion.n_trajectory_intervals and self._size <= COMPARED
+        )
         if self._pairs.size and whole:
             column[self._pairs] = np.arange(self._pairs.size)
             lower = np.concatenate(self._parts)

@@ -176,7 +176,7 @@ def judge_clearance(
     name = "search for counterexamples"
     found = extras.take(name, (), proof.counterexamples, deadline)
     clear = bool(found) and extras.take(NOMINAL, False, _is_clear, nominal, deadline)
-    about = problem, trajectory, proof.motion, proof.inner, deadline
+    about = problem, trajectory, proof.motion, proof.on_path, deadline
     met: tuple[FirstContact, ...] = ()
     if contacts:
         met = extras.take("first contact", (), contacts_of, *about)

@@ -89,7 +89,7 @@ def verify(
     asked = problem, trajectory, motion, places
     proof, lowers = _proved(*asked, sinks, deadline, reach)
     found = judge_clearance(problem, trajectory, proof, places, extras, deadline)
-    if sinks and proof.sent < motion.n_intervals:
+    if sinks and proof.sent < motion.n_trajectory_intervals:
         extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
     meshes = by_mesh(motion.asked, places).items()
