@@ -78,6 +78,9 @@ def _as_seen_from(
 ) -> dict[int, Place]:
     """Where the bodies of some pairs are as seen from the mesh that all are held off.
 
+    A snake arm's links are one chain: its base tells the side of all of them, unless it
+    is inside, as then some link may reach out.
+
     Args:
         mesh: In its own frame.
         number: Its own among the bodies.
@@ -92,21 +95,21 @@ def _as_seen_from(
         place = (point - rest[:3, 3]) @ rest[:3, :3]
         return Place(locate(mesh.closed_mesh, place, off)._replace(who=who), point)
 
-    numbers = asked.table.other[pairs].tolist()
-    chain = range(asked.chain if {*range(asked.chain)} <= {*numbers} else 0)
-    for k, number in zip(pairs.tolist(), numbers, strict=True):
-        body, keeps = asked.own[number], float(asked.table.required[k])
-        pose, who = (
-            poses[body.frame],
-            "the arm" if asked.chain else f"link {body.name!r}",
-        )
-        if chain and number == 0:
-            first = seen(pose, np.zeros(3), min(asked.balls[: len(chain)]), who)
-        if number in chain and (number == 0 or first.where.side is not Side.INSIDE):
-            found[k] = first
-        else:
-            parts = map(_middle, body.pieces)
-            found[k] = _worst(seen(pose, at, off + keeps, who) for at, off in parts)
+    held = asked.table.other[pairs].tolist()
+    links, told = range(asked.chain), dict[int, Place]()
+    if links and {*links} <= {*held}:
+        pose, off = poses[asked.own[0].frame], min(asked.balls[: asked.chain])
+        base = seen(pose, np.zeros(3), off, "the arm")
+        inside = base.where.side is Side.INSIDE
+        told = dict.fromkeys(links[:1] if inside else links, base)
+    for k, own in zip(pairs.tolist(), held, strict=True):
+        if own in told:
+            found[k] = told[own]
+            continue
+        body, keeps = asked.own[own], float(asked.table.required[k])
+        who = "the arm" if links else f"link {body.name!r}"
+        parts, pose = map(_middle, body.pieces), poses[body.frame]
+        found[k] = _worst(seen(pose, at, off + keeps, who) for at, off in parts)
     return found
 
 
