@@ -8,7 +8,7 @@ mesh that a link carries both measure the hulls around it.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.brackets import ClearanceChunk, CoalRows
 from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances
+from vdsm_pin.verification.judgement import guarded
 from vdsm_pin.verification.records import Check, ClosestApproach, Verdict
 
 COMPARED: Final = 2_000_000
@@ -171,6 +172,37 @@ class CoalLog:
         return CoalRows(
             frozen(waypoint, np.int64), frozen(pair, np.int64), frozen(distance)
         )
+
+
+class CoalAnswer(NamedTuple):
+    """Coal's row of evidence, and the distances that it told before it ended.
+
+    Args:
+        checks: The row, undecided where Coal failed or was not done in time.
+        approaches: The closest approaches, with Coal's distance where it was measured.
+        rows: Distances at waypoints.
+    """
+
+    checks: tuple[Check, ...]
+    approaches: tuple[ClosestApproach, ...]
+    rows: CoalRows
+
+
+def ask_coal(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    proved: ProvedLowers,
+    approaches: Mapping[int, ClosestApproach],
+    enclosing: Sequence[str],
+    deadline: Deadline = NO_LIMIT,
+) -> CoalAnswer:
+    """What `check_coal` finds, and all distances until it returned or failed.
+
+    `approaches` and `enclosing` are those of a `CoalLog`.
+    """
+    log = CoalLog(approaches, enclosing)
+    checks = guarded(COAL, check_coal, problem, trajectory, proved, log, deadline)
+    return CoalAnswer(checks, tuple(log.approaches.values()), log.rows())
 
 
 def check_coal(

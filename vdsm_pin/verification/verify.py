@@ -21,11 +21,9 @@ from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
 from vdsm_pin.verification.coal_arm import coal_reach
 from vdsm_pin.verification.coal_check import (
-    COAL,
-    CoalLog,
     LowersSink,
     ProvedLowers,
-    check_coal,
+    ask_coal,
 )
 from vdsm_pin.verification.enclosed import EnclosedSink, pairs_inside
 from vdsm_pin.verification.inside import (
@@ -94,18 +92,18 @@ def verify(
     tip = check_tip(problem, trajectory)
     meshes = by_mesh(motion.asked, places).items()
     around = [name for name, where in meshes if where.side is Side.INSIDE]
-    log = CoalLog(closest_approaches(problem, trajectory, found.nearest), around)
+    nearest = closest_approaches(problem, trajectory, found.nearest)
     args = problem, trajectory, deadline
-    checks = [
+    before_coal = (
         *guarded(fk.NAME, fk.check_fk, model, problem, trajectory, centres, deadline),
         *check_limits(problem, trajectory),
         *checks_of_others(problem.scene),
         *tip.checks,
         *guarded(pointing.NAME, pointing.check_pointing, *args, box),
         *found.checks,
-        *guarded(COAL, check_coal, problem, trajectory, lowers, log, deadline),
-        *guarded(cable_check.NAME, cable_check.check_cables, *args),
-    ]
+    )
+    coal = ask_coal(problem, trajectory, lowers, nearest, around, deadline)
+    cables = guarded(cable_check.NAME, cable_check.check_cables, *args)
     survived = nan, nan
     if joint_error:
         survived = _survived(problem, trajectory, proof, places, extras, deadline)
@@ -113,8 +111,8 @@ def verify(
         problem=problem,
         trajectory=trajectory,
         pairs=proof.pairs,
-        checks=tuple(checks),
-        approaches=tuple(log.approaches.values()),
+        checks=(*before_coal, *coal.checks, *cables),
+        approaches=coal.approaches,
         profile=found.profile,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
@@ -125,7 +123,7 @@ def verify(
         not_done=tuple(extras.not_done),
         time_limit=deadline.limit,
         least=found.least,
-        coal=log.rows(),
+        coal=coal.rows,
     )
 
 
