@@ -14,7 +14,7 @@ import pytest
 
 from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
-from vdsm_pin.errors import OutOfTime
+from vdsm_pin.errors import OutOfTime, VerificationFailed
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.impossible.cut_off import cut_off
@@ -30,8 +30,9 @@ from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.judgement import guarded
 from vdsm_pin.verification.pointing import check_pointing
-from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.records import Check, Verdict, Verification
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
@@ -201,3 +202,25 @@ def test_proofs_of_the_planner_stop() -> None:
     assert np.isinf(upper_bounds(pieces, segments, 0.0)).all()
     with pytest.raises(OutOfTime):
         cut_off(problem, problem.path.points, PASSED)
+
+
+def test_of_an_arithmetic_error_a_row_and_a_traceback_are_left(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """What the package raises by itself needs none: the row says it."""
+
+    def divide(by: float) -> tuple[Check, ...]:
+        if by < 0.0:
+            why = "refused"
+            raise VerificationFailed(why)
+        return (Check("a row", Verdict.CERTIFIED, 1, 1.0 / by, 2.0, "-"),)
+
+    (row,) = guarded("a row", divide, 1.0)
+    assert (row.verdict, caplog.text) == (Verdict.CERTIFIED, "")
+    (row,) = guarded("a row", divide, -1.0)
+    assert (row.verdict, row.where) == (Verdict.UNDECIDED, "not done: refused")
+    assert not caplog.text
+    (row,) = guarded("a row", divide, 0.0)
+    assert (row.verdict, row.count) == (Verdict.UNDECIDED, 0)
+    assert row.where == "not done: float division by zero"
+    assert "in divide" in caplog.text

@@ -1,9 +1,15 @@
 """The clearances of a motion judged, of an arm's or a robot's, meshes as solids.
 
-Besides: the pairs that come nearest, and what becomes of a check that fails and of
-results for which no time is left.
+Besides: the pairs that come nearest, and the policy for errors and time limits:
+
+* A check that raises is an undecided row (`guarded`). Of an arithmetic error, which is
+  a fault of this package, the traceback is logged too.
+* Another result that is not there in time is left out, with a note (`BestEffort`).
+* What takes a deadline and need not raise, as `located`, returns what it has proved.
+* Anything else that is raised ends the verification: there is no result.
 """
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -30,6 +36,7 @@ from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
 from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.clearance_check import Evidence, clearance_checks
 from vdsm_pin.verification.enclosed import (
+    Inside,
     enclosed_checks,
     enclosed_least,
     enclosed_profile,
@@ -45,6 +52,8 @@ from vdsm_pin.verification.records import (
     Verdict,
     is_deepest,
 )
+
+LOG: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -100,6 +109,8 @@ def guarded(
     try:
         rows = run(*args, **kw)
     except (VdsmError, ArithmeticError) as error:
+        if not isinstance(error, VdsmError):
+            LOG.exception("%s failed", name)
         return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not done: {error}"),)
     return rows if isinstance(rows, tuple) else (rows,)
 
@@ -127,20 +138,21 @@ class Judgement:
     checks: tuple[Check, ...]
 
     @cached_property
+    def _inside(self) -> dict[int, Inside]:
+        return pairs_inside(self.proof.motion.asked, self.places)
+
+    @cached_property
     def least(self) -> LeastClearances:
         """The least clearances of all pairs."""
-        inside = pairs_inside(self.proof.motion.asked, self.places)
-        return enclosed_least(self.proof.least, inside)
+        return enclosed_least(self.proof.least, self._inside)
 
-    @property
+    @cached_property
     def profile(self) -> ClearanceProfile:
         """Brackets along the motion."""
         asked = self.proof.motion.asked
-        return enclosed_profile(
-            self.proof.profile, asked, pairs_inside(asked, self.places)
-        )
+        return enclosed_profile(self.proof.profile, asked, self._inside)
 
-    @property
+    @cached_property
     def nearest(self) -> dict[int, ClosestApproach]:
         """The pairs that come nearest, by their numbers."""
         asked, least = self.proof.motion.asked, self.least
