@@ -3,6 +3,7 @@
 Oracles: poses by numpy, distances of points from pieces by closed forms.
 """
 
+from dataclasses import replace
 from math import ceil, floor
 
 import numpy as np
@@ -14,7 +15,7 @@ from oracles.tree_queries import TreeQuery, at, from_piece, make_query, unit
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof import search, stretches
-from vdsm_pin.proof.bodies import Body, Pair, PairTable
+from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -29,6 +30,7 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
+from vdsm_pin.proof.packing import with_errors
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
@@ -207,6 +209,11 @@ def test_the_shortest_slices_are_split_no_more(parts: float) -> None:
     assert found == (UNDECIDED, expected)
     heap[0], met = row, plain(search.new_witnesses)(1, 9.0)
     assert plain(search.tighten)(slicing, heap, 1, met) == expected
+    rules = proving.task.rules._replace(until=0.0)  # nor any without time
+    late = slicing._replace(task=proving.task._replace(rules=rules))
+    heap[0, END] = 1.0
+    assert plain(search.tighten)(late, heap, 1, met) == 1
+    assert plain(search.resolve)(late, heap, heap[0].copy(), asked) == (UNDECIDED, 1)
 
 
 def test_the_first_block_is_looked_at_again_when_it_holds_the_least() -> None:
@@ -236,3 +243,83 @@ def test_a_sweep_that_is_out_of_time_judges_nothing() -> None:
         stretch = Stretch(0, 0, 3, False, False, False)
         assert plain(sweep_pair)(*asked, 0, stretch) == (until > 0.0)
         assert proving.results.counts.sum() == (3 if until > 0.0 else 0)
+
+
+def test_no_intervals_are_told_without_room_or_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slide = Tree((Joint(0, Kind.PRISMATIC, (1.0, 0.0, 0.0), column=0),))
+    bodies = [Body(k, (Hull(np.array([[2.0 * k, 0.0, 0.0]]), 0.1),)) for k in (0, 1)]
+    pairs, path = PairTable.of([Pair(0, 1)]), Path(np.zeros((4, 1)))
+
+    def told(until: float) -> bool:
+        budget = Budget(until=until)
+        proving, _ = start_proof(slide, bodies, path, pairs, budget=budget)
+        return stretches.Stretches(proving, np.arange(1)).each() is not None
+
+    assert told(np.inf) and not told(0.0)
+    for most in (3, 2):
+        monkeypatch.setattr(stretches, "MOST_BRACKETS", most)
+        assert told(np.inf) == (most == 3)
+
+
+def test_what_finds_no_room_for_a_second_look_is_not_said_to_be_clear() -> None:
+    """Two balls, passed in the middle of each interval: no row is as near as that."""
+    turn = Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    bodies = [Body(1, (Hull(np.array([[1.0, 0.0, 0.0]]), 0.1),)), *(
+        Body(0, (Hull(np.array([[1.5, 0.0, z]]), 0.1),)) for z in (0.3, -0.3)
+    )]  # fmt: skip
+    path = Path(np.array([-0.2, 0.2, -0.2, 0.2])[:, None])
+    nearest = np.hypot(0.5, 0.3) - 0.2
+    for slices, candidates in [(1, 1), (1, 2), (2, 2), (3, 3), (9, 9)]:
+        budget = Budget(slices=slices, candidates=candidates)
+        asked = [Pair(0, 1), Pair(0, 2)]
+        proof = prove(turn, bodies, path, asked, budget=budget)
+        assert proof.is_certified
+        assert (proof.lower <= nearest + 1e-9).all()
+        assert (proof.upper >= nearest - 1e-9).all()
+
+
+def test_what_errors_added_is_forgotten_with_them() -> None:
+    """The same working space is asked with errors and then without."""
+    turn = Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    bodies = [Body(1, (Hull(np.array([[1.0, 0.0, 0.0]]), 0.1),)),
+              Body(0, (Hull(np.array([[2.0, 0.0, 0.0]]), 0.1),))]  # fmt: skip
+    pairs, path = PairTable.of([Pair(0, 1)]), Path(np.array([[0.0], [0.1]]))
+    proving, _ = start_proof(turn, bodies, path, pairs)
+
+    def least(error: float) -> float:
+        box = ErrorBox(np.array([error]), np.zeros(1), np.zeros(1))
+        task = with_errors(proving.task, box)
+        results = proving.new_results()
+        assert replace(proving.fresh(results), task=task).sweep(0, 1)
+        return float(results.best[0, LOW])
+
+    without = least(0.0)
+    assert least(0.3) < without - 0.01
+    assert least(0.0) == pytest.approx(without, abs=1e-9)
+
+
+def test_of_one_row_a_path_through_it_has_no_pieces() -> None:
+    rates = np.zeros((1, 2))
+    for given in ((None, None), (np.zeros(1), None), (None, rates)):
+        path = Path.through(np.ones((1, 2)), *given)
+        assert path.inner.shape == (0, 0, 2) and path.knots.tolist() == [[1.0, 1.0]]
+
+
+def test_what_one_interval_proves_is_not_said_of_the_next() -> None:
+    """Between two walls, which takes two planes, a ball comes nearer row by row."""
+    slide = Tree((Joint(0, Kind.PRISMATIC, (1.0, 0.0, 0.0), column=0),))
+    face = np.array([[0.0, y, z] for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    walls = tuple(Hull(face + np.array([x, 0.0, 0.0])) for x in (-1.0, 1.0))
+    bodies = [Body(1, (Hull(np.zeros((1, 3)), 0.1),)), Body(0, walls)]
+    for steps in (np.linspace(0.0, 0.85, 40), np.array([0.0, 0.3, 0.5, 0.6, 0.85])):
+        pairs, path = PairTable.of([Pair(0, 1)]), Path(steps[:, None])
+        proving, _ = start_proof(slide, bodies, path, pairs)
+        dense, _ = dense_of(proving)
+        nearest = 0.9 - steps[1:]
+        assert (dense.verdict == CERTIFIED).all()
+        for column in range(dense.lower.shape[1]):
+            np.testing.assert_allclose(dense.upper[:, column], nearest, rtol=0.03)
+            assert (dense.lower[:, column] <= nearest + 1e-9).all()
+            assert (dense.lower[:, column] >= 0.95 * nearest).all()

@@ -24,6 +24,7 @@ from vdsm_pin.proof import (
     plane_bounds,
     results,
     rows,
+    search,
     slices,
     swept_bodies,
     terms,
@@ -33,15 +34,18 @@ from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
+    END,
     HELD,
     HELD_AT,
     HELD_CLEARANCE,
+    INTERVAL,
     KEY,
     LOST,
     LOW,
     OTHER,
     OWN,
     SLICE,
+    START,
     SUPPORT,
     TIME,
     UP,
@@ -85,6 +89,7 @@ bound_below = plain(plane_bounds.bound_below)
 any_below, nominate = plain(results.any_below), plain(results.nominate)
 note_block, note_upper = plain(results.note_block), plain(results.note_upper)
 witness_at, mover_in = plain(witnesses.witness_at), plain(mover_of)
+place_pair = plain(search.place_pair)
 new_space, loaded_bound = plain(slices.new_space), plain(slices.loaded_bound)
 new_ends, load_body = plain(swept_bodies.new_ends), plain(swept_bodies.load_body)
 errors_along, loaded_body = plain(way_errors), plain(new_body)
@@ -404,6 +409,39 @@ def test_a_slice_bends_as_the_whole_interval_of_a_path_cut_there(degree: int) ->
             part[:] = 7.0
         stay(task.ways, found, way)
         assert not any(part[way] for part in found[:4])
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_a_slice_loads_the_body_of_a_path_cut_there(degree: int) -> None:
+    """Corners, generators of errors and balls, of any length of the slice."""
+    rng = np.random.default_rng([14, degree])
+    for _ in range(16):
+        tree = random_tree(rng, int(rng.integers(1, 9)))
+        path = random_path(rng, tree, 3, degree)
+        frame, rest = rng.choice(tree.n_frames, 2, replace=False).tolist()
+        corners = rng.uniform(-0.3, 0.3, (int(rng.integers(1, 5)), 3))
+        bodies = [Body(frame, (Hull(corners, 0.03),)), Body(rest, (Hull(corners[:1]),))]
+        task = pack_task(tree, bodies, PairTable.of([Pair(0, 1)]), RULES, path.reach)
+        task = with_errors(task, random_box(rng, tree))
+        start, end = np.sort(rng.uniform(size=2))
+        piece = bernstein.part(path.controls[1:2], *np.array([start, end])[:, None])
+        alone, row = Path(piece[0, [0, -1]], piece[:, 1:-1]), np.zeros(SLICE)
+        loaded = []
+        for motion, slice_ in ((path, (1.0, 0.0, start, end)), (alone, (0, 0, 0, 1))):
+            ends = new_ends(tree.n_frames, len(task.ways.rest), tree.n_columns)
+            space = new_space(len(tree.joints), len(corners))
+            row[INTERVAL:] = slice_
+            place_pair(search.Slicing(task, motion.packed(), ends, space), row)
+            load_body(task, mover_in(task, 0), ends, space.body, row[END] - row[START])
+            loaded.append(space.body)
+        one, other = loaded
+        n, sizes = len(corners), other.sizes.tolist()
+        assert one.used.tolist() == other.used.tolist() == [2 * n, n]
+        assert one.sizes.tolist() == sizes
+        np.testing.assert_allclose(one.points, other.points, rtol=0, atol=1e-12)
+        for a, b, size in zip(one.swings, other.swings, sizes, strict=True):
+            np.testing.assert_allclose(a[:size], b[:size], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(one.balls, other.balls, rtol=1e-9, atol=1e-13)
 
 
 # ---- what is remembered of blocks --------------------------------------------------
