@@ -11,7 +11,7 @@ from vdsm_pin.io.source import (
     BLOCK,
     bounded_lines,
     check_unchanged,
-    naming,
+    naming_file,
     opened,
     path_of,
     sha256_of_file,
@@ -56,10 +56,10 @@ def test_a_file_that_changes_is_told(tmp_path: Path) -> None:
 
 
 def test_an_error_names_the_file_unless_it_names_its_own() -> None:
-    with pytest.raises(InvalidFile, match=r"^a: is wrong$"), naming(Path("a")):
+    with pytest.raises(InvalidFile, match=r"^a: is wrong$"), naming_file(Path("a")):
         message = "is wrong"
         raise InvalidInput(message)
-    with pytest.raises(InvalidFile, match=r"^b: is wrong$"), naming(Path("a")):
+    with pytest.raises(InvalidFile, match=r"^b: is wrong$"), naming_file(Path("a")):
         raise InvalidFile(file="b", problem="is wrong")
 
 

@@ -103,7 +103,7 @@ class ArmBuilder(Builder):
         if not isinstance(model.link_radius, list):
             return np.full(count, self.frame.metres(model.link_radius))
         at = (*self.at, "link_radius")
-        self.check_count(at, model.link_radius, count, "values, one per link")
+        self.check_count(at, model.link_radius, count, "values", "link")
         return self.frame.metres(model.link_radius)
 
     def _feed(self, model: schema.ManipulatorModel, radius: float) -> Feed | None:
@@ -190,7 +190,7 @@ class ArmBuilder(Builder):
                 raise self.invalid((*at, "half_gap"), problem)
             if cables.hole_angles_deg is not None:
                 at, rows = (*at, "hole_angles_deg"), cables.hole_angles_deg
-                self.check_count(at, rows, count, "rows, one per link")
+                self.check_count(at, rows, count, "rows", "link")
                 angles = radians(cables.hole_angles_deg)
         metres = self.frame.metres([hole_radius, half_gap])
         return CableLayout(float(metres[0]), float(metres[1]), angles)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.places import Place
-from vdsm_pin.io.source import naming
+from vdsm_pin.io.source import naming_file
 from vdsm_pin.io.trajectory_messages import message_of, of_message
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 
@@ -58,7 +58,7 @@ def read_bag(file: Path, topic: str | None = None) -> JointTrajectory:
     Raises:
         InvalidFile: If it is not there, not the only one or damaged.
     """
-    with naming(file):
+    with naming_file(file):
         data = _read(file, topic)
     return of_message(Place.of(file, data))
 

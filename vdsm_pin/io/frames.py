@@ -178,16 +178,17 @@ class Builder:
         """The error that names a value by its field and line."""
         return self.document.invalid(at, problem)
 
-    def check_count(self, at: Location, rows: Sized, count: int, each: str) -> None:
+    def check_count(
+        self, at: Location, rows: Sized, count: int, noun: str, per: str
+    ) -> None:
         """Refuse a list of another length.
 
         Raises:
-            InvalidFile: If it has other than `count` rows, such as `values, one per
-                link`.
+            InvalidFile: If it has other than `count` values or rows (the noun), one
+                per link or joint.
         """
         if len(rows) != count:
-            noun, _, what = each.partition(", ")
-            problem = f"has {len(rows)} {noun}, expected {count}, {what}"
+            problem = f"has {len(rows)} {noun}, expected {count}, one per {per}"
             raise self.invalid(at, problem)
 
     def check_extent(self, at: Location, reach: float, what: str, origin: str) -> None:
@@ -196,8 +197,8 @@ class Builder:
         Args:
             at: The value.
             reach: How far it goes; [m].
-            what: What is said of that before the length.
-            origin: From where.
+            what: The message up to the length, as `'crate' reaches`.
+            origin: From where, as `the base`.
 
         Raises:
             InvalidFile: If that is too far.

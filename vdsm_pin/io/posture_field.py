@@ -97,7 +97,7 @@ class PostureBuilder(Builder):
         angles = {"alpha_deg": model.alpha_deg, "theta_deg": model.theta_deg}
         limit = np.rad2deg(self.arm.max_joint_angle)
         for name, values in angles.items():
-            self.check_count((*at, name), values, n, "values, one per joint")
+            self.check_count((*at, name), values, n, "values", "joint")
             for i, value in enumerate(values):
                 if not abs(value) <= limit + np.rad2deg(TOLERANCES.joint_limit):
                     problem = f"is {value:g}°, the joint's limit is {limit:g}°"

@@ -194,7 +194,7 @@ def _row_change(model: schema.ProblemModel) -> float | None:
 
 
 def _check_ends(model: schema.ProblemModel, document: YamlDocument) -> None:
-    """A path says itself where the motion begins; start and goal are for the others."""
+    """Refuse start and goal beside tip_path, which has its own."""
     if model.tip_path is None:
         return
     for name, advice in (

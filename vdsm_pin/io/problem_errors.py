@@ -143,7 +143,9 @@ def _of_any_shape(
 ) -> Iterator[ErrorDetails]:
     """What is wrong of something without a known shape, whatever its shape was to be.
 
-    That is what every shape refuses that knows the key.
+    That is what every shape refuses that knows the key: of {name: 7, radius: -1}, which
+    has no shape, that a name is text and a radius above 0; not that `size` is missing,
+    which boxes alone have.
     """
     given, loc = details["input"], details["loc"]
     if not details["type"].startswith("union_tag") or not isinstance(given, dict):

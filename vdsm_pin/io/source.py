@@ -96,7 +96,7 @@ def readable(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
+def naming_file(path: Path) -> Iterator[None]:
     """Name a file where it makes what is done within invalid.
 
     Raises:

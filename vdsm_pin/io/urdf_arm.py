@@ -17,7 +17,7 @@ import numpy as np
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.source import decode, naming, read_bytes
+from vdsm_pin.io.source import decode, naming_file, read_bytes
 from vdsm_pin.io.xml_reader import declared
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -78,7 +78,7 @@ def read_urdf_arm(path: Path) -> UrdfArm:
         InvalidFile: If the file is no URDF, or not of such an arm; names the joint.
     """
     content = read_bytes(path, limit=MAX_BYTES)
-    with naming(path):
+    with naming_file(path):
         document = validate_urdf(declared(decode(content, path)))
     from yourdfpy import URDF  # slow to import, and only such files need it
 

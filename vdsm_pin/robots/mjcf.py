@@ -12,7 +12,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
-from vdsm_pin.io.source import check_is_file, naming, read_bytes
+from vdsm_pin.io.source import check_is_file, naming_file, read_bytes
 from vdsm_pin.io.xml_reader import read_xml
 from vdsm_pin.problem.scene import Obstacle, Scene
 
@@ -32,7 +32,7 @@ def read_mjcf(file: Path) -> tuple[Scene, tuple[Path, ...]]:
         problem = "has a name that is not UTF-8 text, which mujoco does not open"
         raise InvalidFile(file=file, problem=problem)
     included = check_size(file)
-    with naming(file):
+    with naming_file(file):
         return Scene(tuple(_solids(file))), included
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.io.source import naming
+from vdsm_pin.io.source import naming_file
 from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body, LeftOut
 from vdsm_pin.proof.tree import Tree
@@ -30,7 +30,7 @@ def read_robot(files: RobotFiles) -> Robot:
     """
     urdf, group, solids = files.urdf, files.group, files.solids
     text, included = urdf_text(urdf, files.package_dirs)
-    with naming(urdf):
+    with naming_file(urdf):
         document = validate_urdf(text, geometry_only=True)
     more = Srdf(files.srdf, document) if files.srdf is not None else None
     if group is not None and more is None:
