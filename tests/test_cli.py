@@ -417,7 +417,7 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
         ],
         "--certificate needs a value; --pdf": [*verify, rows, "--certificate", "--pdf"],
         "--out needs a value; --quiet": ["batch", good, "--out", "--quiet"],
-        "an argument is empty": ["plan", good, "--out", ""],
+        "argument 4 is empty": ["plan", good, "--out", ""],
         "is a variable not set?": ["plan", good, "--out="],
         "vdsm: /: is a folder": [*verify, "/"],
     }

@@ -57,9 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     show_everything()
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        if any(not word or (word[:2] == "--" and word[-1] == "=") for word in given):
-            message = "an argument is empty; is a variable not set?"
-            raise InvalidInput(message)
+        for place, word in enumerate(given, 1):
+            if not word or (word[:2] == "--" and word[-1] == "="):
+                what = word or f"argument {place}"
+                message = f"{what} is empty; is a variable not set?"
+                raise InvalidInput(message)
         try:
             app(given, prog_name="vdsm", obj=shlex.join(["vdsm", *given]))
         finally:
