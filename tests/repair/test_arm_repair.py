@@ -231,7 +231,7 @@ def test_a_repaired_motion_that_is_not_proved_as_written_is_no_success(
 
     Nothing is written then.
     """
-    given, verify = tmp_path / "t.csv", app_repair.verify_aside
+    given, verify = tmp_path / "t.csv", app_repair.verify_into
     write_trajectory(given, planned("paper/free")[1])
 
     def late(order: VerifyOrder, motion: Given, aside: Path) -> Verified:
@@ -239,7 +239,7 @@ def test_a_repaired_motion_that_is_not_proved_as_written_is_no_success(
         subject = subject_of(order.problem, order.options)
         return verify(order, motion._replace(subject=subject), aside)
 
-    monkeypatch.setattr(app_repair, "verify_aside", late)
+    monkeypatch.setattr(app_repair, "verify_into", late)
     words = ["repair", "paper/free", "--trajectory", str(given), "--out"]
     ended = CliRunner().invoke(app, [*words, str(tmp_path / "o")], obj="vdsm repair")
     assert ended.exit_code == 1

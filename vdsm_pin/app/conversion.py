@@ -29,7 +29,7 @@ CONVERTED: Final = TRAJECTORY, CENTRES, CABLES
 
 
 @dataclass(frozen=True)
-class Given:
+class MotionFile:
     """The one file that is converted; the others are None.
 
     Args:
@@ -74,7 +74,7 @@ class Given:
 
 
 def convert_to_folder(
-    problem: PlanningProblem, given: Given, folder: Path, also: Sequence[str] = ()
+    problem: PlanningProblem, given: MotionFile, folder: Path, also: Sequence[str] = ()
 ) -> Trajectory:
     """Write one motion as angles, as joint centres and as cable lengths.
 
@@ -96,11 +96,11 @@ def convert_to_folder(
     outputs = [folder / name for name in (*CONVERTED, *map(message_name, also))]
     check_kept(outputs, [*problem.files, file])
     motion = given.read(problem)
-    with staged(folder) as aside:
-        write_trajectory(aside / TRAJECTORY, motion)
-        write_centres(aside / CENTRES, problem, motion)
-        write_cables(aside / CABLES, problem, motion)
-        write_messages(aside, arm_message(motion), also)
+    with staged(folder) as staging:
+        write_trajectory(staging / TRAJECTORY, motion)
+        write_centres(staging / CENTRES, problem, motion)
+        write_cables(staging / CABLES, problem, motion)
+        write_messages(staging, arm_message(motion), also)
     return motion
 
 
@@ -124,9 +124,9 @@ def convert_robot(cell: Cell, file: Path, folder: Path, also: Sequence[str]) -> 
     check_kept([folder / name for name in names], [*cell.files, file])
     robot = cell.robot
     motion = read_motion(file, robot.joints, values=robot.values)
-    with staged(folder) as aside:
-        (aside / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")
-        write_messages(aside, motion, also)
+    with staged(folder) as staging:
+        (staging / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")
+        write_messages(staging, motion, also)
     return len(motion.q)
 
 

@@ -11,7 +11,7 @@ from vdsm_pin.app.workflow import (
     TRAJECTORY,
     VerifyOrder,
     read_given,
-    verify_aside,
+    verify_into,
 )
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.source import check_unchanged, sha256_of_file
@@ -61,13 +61,13 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Repair
             for given, moved in rows
         ],
     }
-    with staged(order.folder) as aside:
-        subject.write(aside / TRAJECTORY, subject.motion_of(found.verification))
-        (aside / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
+    with staged(order.folder) as staging:
+        subject.write(staging / TRAJECTORY, subject.motion_of(found.verification))
+        (staging / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
         options = MotionOptions(deadline=order.options.deadline)
-        again = replace(order, trajectory=aside / TRAJECTORY, options=options)
-        verified = verify_aside(again, read_given(again), aside)
+        again = replace(order, trajectory=staging / TRAJECTORY, options=options)
+        verified = verify_into(again, read_given(again), staging)
         if verified.records.verdict is not Verdict.CERTIFIED:
-            message = f"the repaired motion, as written: {verified.file.reason}"
+            message = f"the repaired motion, as written: {verified.content.reason}"
             raise Infeasible(message)
-    return RepairedFiles(found, verified.file)
+    return RepairedFiles(found, verified.content)

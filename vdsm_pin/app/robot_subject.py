@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # few need repair or a certificate
     from vdsm_pin.certificate_writer.lines import Hashes
     from vdsm_pin.repair.rounds import Repaired
 
-GIVEN: Final = Path("trajectory")
+NO_FILE: Final = Path("trajectory")
 """What messages name in place of a file where a motion has none."""
 
 
@@ -68,8 +68,8 @@ class RobotSubject:
         """The motion with its columns in the robot's order, if it has its joints."""
         robot = self.problem.robot
         given = expect(motion, JointTrajectory, "read_trajectory(path, problem)")
-        found = moved(given, robot.joints, robot.values, GIVEN)
-        path_of(GIVEN, found)
+        found = moved(given, robot.joints, robot.values, NO_FILE)
+        path_of(NO_FILE, found)
         return found
 
     def judge(

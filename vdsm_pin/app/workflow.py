@@ -65,7 +65,8 @@ class VerifyOrder:
 
     Args:
         problem: The problem of an arm or of any other robot, as it was read.
-        trajectory: The trajectory file.
+        trajectory: The trajectory file. The report tells of plan.json beside it where
+            that is of this motion.
         folder: Where the results go.
         command: The exact command line, for the report.
         certificate: Where the certificate of a certified motion goes; None for none.
@@ -93,12 +94,13 @@ class Verified:
     """A verification as records and as the content of verification.json.
 
     Args:
-        file: The content of verification.json.
+        content: Of verification.json.
         records: The verification.
-        no_certificate: Why there is no certificate, in words; empty where there is.
+        no_certificate: Why a certificate that was asked for is missing, in words;
+            empty where none is.
     """
 
-    file: VerificationFile
+    content: VerificationFile
     records: Verification
     no_certificate: str = ""
 
@@ -143,23 +145,23 @@ def plan_to_folder(
     try:
         refinement = plan_and_verify(problem, strategy, deadline=deadline)
     except (Infeasible, OutOfTime) as error:
-        with staged(folder) as aside:
-            write_no_plan(aside / NO_PLAN, problem, error, strategy, record)
+        with staged(folder) as staging:
+            write_no_plan(staging / NO_PLAN, problem, error, strategy, record)
         error.page = folder / NO_PLAN
         raise
     plan = refinement.plan
-    with staged(folder) as aside:
-        write_trajectory(aside / TRAJECTORY, plan.trajectory)
-        write_centres(aside / CENTRES, problem, plan.trajectory, plan.centres)
-        write_cables(aside / CABLES, problem, plan.trajectory)
-        digest = sha256_of_file(aside / TRAJECTORY)
+    with staged(folder) as staging:
+        write_trajectory(staging / TRAJECTORY, plan.trajectory)
+        write_centres(staging / CENTRES, problem, plan.trajectory, plan.centres)
+        write_cables(staging / CABLES, problem, plan.trajectory)
+        digest = sha256_of_file(staging / TRAJECTORY)
         record = replace(record, trajectory_sha256=digest)
         file = plan_file(refinement, record)
-        (aside / PLAN).write_text(file.text(), encoding="utf-8")
+        (staging / PLAN).write_text(file.text(), encoding="utf-8")
         if report:
             judged = refinement.verification
             words = verification_file(judged, record)
-            write_report(aside / REPORT, judged, words, file)
+            write_report(staging / REPORT, judged, words, file)
     (folder / NO_PLAN).unlink(missing_ok=True)
     return file
 
@@ -188,8 +190,8 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     """
     _check_outputs(order)
     given = read_given(order)
-    with staged(order.folder) as aside:
-        verified = verify_aside(order, given, aside)
+    with staged(order.folder) as staging:
+        verified = verify_into(order, given, staging)
     if order.pdf is not None:
         print_page(order.folder / REPORT, order.pdf)
     return verified
@@ -215,8 +217,8 @@ def read_given(order: VerifyOrder) -> Given:
     return Given(subject.read(order.trajectory), digest, subject)
 
 
-def verify_aside(order: VerifyOrder, given: Given, aside: Path) -> Verified:
-    """Verify a trajectory; all but the certificate and the PDF goes to a folder aside.
+def verify_into(order: VerifyOrder, given: Given, staging: Path) -> Verified:
+    """Verify a trajectory; all but the certificate and the PDF goes to a folder.
 
     Raises:
         InvalidInput: If the file has changed since it was read.
@@ -226,29 +228,29 @@ def verify_aside(order: VerifyOrder, given: Given, aside: Path) -> Verified:
     from vdsm_pin.report.html import write_report
 
     motion, digest, subject = given
-    verification = _judged(order, subject, motion, aside)
+    verification = _judged(order, subject, motion, staging)
     check_unchanged(order.trajectory, digest)
     source, urdf = order.problem.source, subject.urdf_sha256
     record = RunRecord.of(order.command, source, urdf, digest, order.date)
     file = verification_file(verification, record)
-    (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
-    write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
+    (staging / VERIFICATION).write_text(file.text(), encoding="utf-8")
+    write_report(staging / REPORT, verification, file, planned_by(order.trajectory))
     # Last inside: a certificate that cannot be written leaves no half of a result.
     missing = _certify(order, subject, verification, record)
     return Verified(file, verification, missing)
 
 
 def _judged(
-    order: VerifyOrder, subject: Subject, motion: Any, aside: Path
+    order: VerifyOrder, subject: Subject, motion: Any, staging: Path
 ) -> Verification:
-    """Verify a motion, and write clearance.csv and the tables of its kind aside."""
+    """Verify a motion, and write clearance.csv and the tables of its kind."""
     reach = math.inf if order.all_pairs else subject.csv_reach
-    table = ClearanceCsv(aside / CLEARANCE, order.problem, subject.n_pairs, reach)
+    table = ClearanceCsv(staging / CLEARANCE, order.problem, subject.n_pairs, reach)
     with closing(table) as clearance:
         verification = subject.judge(motion, (clearance,), reach, joint_error=True)
         clearance.write(verification)
     step("writing the results")
-    subject.write_tables(aside, verification)
+    subject.write_tables(staging, verification)
     return verification
 
 
@@ -283,9 +285,9 @@ def planned_by(trajectory: Path) -> PlanFile | None:
 def _certify(
     order: VerifyOrder, subject: Subject, verification: Verification, record: RunRecord
 ) -> str:
-    """Write the proof down, or say why not."""
+    """Write the proof down if it is asked for, or say why not."""
     if order.certificate is None:
-        return "not asked for"
+        return ""
     if verification.verdict is not Verdict.CERTIFIED:
         return "no proof"
     from vdsm_pin.certificate_writer.lines import Hashes

@@ -136,7 +136,7 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
     )
     verified = verify_to_folder(order)
     certified = verified.records.verdict is Verdict.CERTIFIED
-    if asked.certificate and certified and verified.no_certificate:
+    if certified and verified.no_certificate:
         message = f"certified, but without a certificate: {verified.no_certificate}"
         raise VerificationFailed(message)
     planned = task.trajectory is None
@@ -144,7 +144,7 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
         raise OutOfTime(deadline.limit, "a plan was found and proved, but not reported")
     drawing = picture(verified.records)
     (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
-    row = batch_row(task.final.name, task.strategy, verified.file)
+    row = batch_row(task.final.name, task.strategy, verified.content)
     known = {"problem": printable(task.problem)}
     # The planner knows why it left something out, the verification does not.
     if plan is not None and plan.verdict == row.outcome == "incomplete":

@@ -50,9 +50,9 @@ def check_certificate(
     from vdsm_pin.certificate_checker import main
     from vdsm_pin.progress import shown, step
 
-    if any(answer):
+    if answer.wordless:
         found = check(certificate, Path(problem), trajectory)
-        answer.tell("", accepted=found.accepted, **found._asdict())
+        answer.tell_facts(accepted=found.accepted, **found._asdict())
         raise typer.Exit(PASSED if found.accepted else NOT_PASSED)
     with shown(lines=False):
         step("recomputing every claim")
@@ -97,9 +97,8 @@ def simulate(
     asked = read_problem(problem)
     order = SimulationOrder(asked, trajectory, out, assumed, settings)
     file = simulate_to_folder(order)
-    if any(answer):
-        answer.tell("", **file.model_dump(mode="json"))
-    else:
+    answer.tell_facts(**file.model_dump(mode="json"))
+    if not answer.wordless:
         show_simulation(file, out)
     passed = file.executed.verdict == "certified"
     raise typer.Exit(PASSED if passed else NOT_PASSED)
@@ -182,11 +181,12 @@ def convert(
     trajectory.csv, centres.csv and cables.csv. Of a robot (problem with robot) it
     takes a trajectory of any format and writes trajectory.csv. Nothing is judged.
     """
-    from vdsm_pin.app.conversion import Given, convert_robot, convert_to_folder
+    from vdsm_pin.app.conversion import MotionFile, convert_robot, convert_to_folder
     from vdsm_pin.app.subjects import read_problem_or_cell
     from vdsm_pin.problem.planning_problem import PlanningProblem
 
-    given, more = Given(trajectory, centres, cables), [one.value for one in also or ()]
+    given = MotionFile(trajectory, centres, cables)
+    more = [one.value for one in also or ()]
     notes: tuple[str, ...] = ()
     asked = read_problem_or_cell(problem)
     if isinstance(asked, PlanningProblem):

@@ -138,12 +138,21 @@ class Answer(NamedTuple):
     quiet: Quiet = False
     as_json: AsJson = False
 
+    @property
+    def wordless(self) -> bool:
+        """Whether no words for people are wanted."""
+        return self.quiet or self.as_json
+
     def tell(self, text: str, **facts: Any) -> None:
         """Say it in words, as facts for other programs, or not at all."""
+        self.tell_facts(**facts)
+        if not self.wordless:
+            typer.echo(text)
+
+    def tell_facts(self, **facts: Any) -> None:
+        """Say it as facts for other programs, if they are wanted."""
         if self.as_json:
             typer.echo(json.dumps(facts, indent=2, default=str))
-        elif not self.quiet:
-            typer.echo(text)
 
 
 class _Command(TyperCommand):

@@ -62,7 +62,7 @@ def plan(
     with _planning(time_limit) as deadline:
         with enforced(deadline, grace=0.0):
             asked = read_problem(problem).under(box)
-        told = nullcontext() if any(answer) else shown(limit=deadline.limit)
+        told = nullcontext() if answer.wordless else shown(limit=deadline.limit)
         with enforced(deadline), told:
             file = plan_to_folder(asked, strategy, out, context.obj, deadline)
         if asked.scene.obstacles:  # without any, little is compiled

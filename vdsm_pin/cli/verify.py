@@ -100,7 +100,7 @@ def verify(
     with enforced(deadline, grace=0.0):
         asked = asked_problem(problem, box, robot, of_arm, topic)
         if certificate is not None and robot.urdf is not None:
-            asked = _stated(asked, robot, certificate, trajectory)
+            asked = _write_problem(asked, robot, certificate, trajectory)
         order = VerifyOrder(
             problem=asked,
             trajectory=trajectory,
@@ -112,7 +112,7 @@ def verify(
             all_pairs=all_pairs,
             date=now(),
         )
-    raise typer.Exit(PASSED if _passes(order, answer) else NOT_PASSED)
+    raise typer.Exit(PASSED if _verify_and_tell(order, answer) else NOT_PASSED)
 
 
 def asked_problem(
@@ -145,13 +145,13 @@ def asked_problem(
     return asked.under(errors)
 
 
-def _stated(
+def _write_problem(
     asked: "PlanningProblem | Cell",
     robot: RobotOptions,
     certificate: Path,
     motion: Path,
 ) -> "Cell":
-    """What options ask, from the problem file that their certificate is about."""
+    """Write what options ask to a problem file beside the certificate, and read it."""
     from vdsm_pin.app.stated_problem import stated_cell
     from vdsm_pin.robots.cell import Cell
 
@@ -159,14 +159,14 @@ def _stated(
     return stated_cell(asked, robot.files(), robot.scene, certificate, motion)
 
 
-def _passes(order: "VerifyOrder", answer: Answer) -> bool:
-    """Verify a motion, and say what was found."""
+def _verify_and_tell(order: "VerifyOrder", answer: Answer) -> bool:
+    """Verify a motion, say what was found, and return whether it is as asked."""
     from vdsm_pin.app.workflow import verify_to_folder
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
 
-    bar = nullcontext() if any(answer) else shown(lines=False)
+    bar = nullcontext() if answer.wordless else shown(lines=False)
     with enforced(order.options.deadline), bar:
         verified = verify_to_folder(order)
     written: list[tuple[str, str]] = []
@@ -182,11 +182,10 @@ def _passes(order: "VerifyOrder", answer: Answer) -> bool:
     if order.pdf is not None:
         written.append(("report on paper", str(order.pdf)))
     if answer.as_json:
-        typer.echo(verified.file.text(), nl=False)
+        typer.echo(verified.content.text(), nl=False)
     elif not answer.quiet:
-        show_verification(verified.file, order.folder, *written)
-    complete = order.certificate is None or not verified.no_certificate
-    return outcome(verified.file.verdict).passed and complete
+        show_verification(verified.content, order.folder, *written)
+    return outcome(verified.content.verdict).passed and not verified.no_certificate
 
 
 @commands.command(
@@ -233,9 +232,9 @@ def repair(
         order = VerifyOrder(asked, trajectory, out, context.obj, options=options)
         found, file = repair_to_folder(order, tuple(pin or ()))
     count, new, most = len(found.moved), int((found.given < 0).sum()), found.moved.max()
-    if any(answer):
-        facts = {"waypoints": count, "new": new, "moved_at_most": float(most)}
-        answer.tell("", verdict="certified", **facts, folder=out)
+    facts = {"waypoints": count, "new": new, "moved_at_most": float(most)}
+    answer.tell_facts(verdict="certified", **facts, folder=out)
+    if answer.wordless:
         return
     show_verification(
         file,

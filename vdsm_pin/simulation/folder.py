@@ -137,12 +137,12 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
     found = simulate(problem.manipulator, planned, order.settings)
     file = summary(problem, planned, found, order.settings, digest)
     check_unchanged(order.trajectory, digest)
-    with staged(order.folder) as aside:
-        write_trajectory(aside / EXECUTED, found.trajectory)
-        _write_record(aside / RECORD, found)
-        (aside / SUMMARY).write_text(file.text(), encoding="utf-8")
+    with staged(order.folder) as staging:
+        write_trajectory(staging / EXECUTED, found.trajectory)
+        _write_record(staging / RECORD, found)
+        (staging / SUMMARY).write_text(file.text(), encoding="utf-8")
         text = page(file, found, order.settings, problem.required_clearance)
-        (aside / PAGE).write_text(text, encoding="utf-8")
+        (staging / PAGE).write_text(text, encoding="utf-8")
     return file
 
 

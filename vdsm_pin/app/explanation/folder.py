@@ -58,7 +58,7 @@ def explain_to_folder(
         steps.angles_step(moment),
         _checks(found, row),
     )
-    with staged(folder) as aside:
+    with staged(folder) as staging:
         text = rendered(  # pictures are our own SVG
             "explain.html.j2",
             problem=problem,
@@ -66,7 +66,7 @@ def explain_to_folder(
             n_waypoints=made.trajectory.n_samples,
             parts=parts,
         )
-        (aside / PAGE).write_text(text, encoding="utf-8")
+        (staging / PAGE).write_text(text, encoding="utf-8")
     return folder / PAGE, row
 
 
