@@ -24,6 +24,7 @@ from vdsm_pin.proof.layouts import (
     LOW,
     OTHER,
     OWN,
+    RENEWED,
     SLICE,
     SLICES,
     START,
@@ -323,3 +324,16 @@ def test_what_one_interval_proves_is_not_said_of_the_next() -> None:
             np.testing.assert_allclose(dense.upper[:, column], nearest, rtol=0.03)
             assert (dense.lower[:, column] <= nearest + 1e-9).all()
             assert (dense.lower[:, column] >= 0.95 * nearest).all()
+
+
+def test_a_clearance_held_serves_while_the_body_moves_less_than_the_slack() -> None:
+    """Between two walls no plane serves: 60 mm at 0.9 m off take 60 looks or a few."""
+    slide = Tree((Joint(0, Kind.PRISMATIC, (0.0, 1.0, 0.0), column=0),))
+    face = np.array([[0.0, y, z] for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    walls = tuple(Hull(face + np.array([x, 0.0, 0.0])) for x in (-1.0, 1.0))
+    bodies = [Body(1, (Hull(np.zeros((1, 3)), 0.1),)), Body(0, walls)]
+    path, moved = Path(np.linspace(0.0, 0.06, 61)[:, None]), 0.06
+    proving, _ = start_proof(slide, bodies, path, PairTable.of([Pair(0, 1)]))
+    assert proving.sweep(0, 60)
+    looks = proving.results.tally[RENEWED]
+    assert 1 <= looks <= ceil(moved / (0.9 * Budget().slack * 0.9)) + 1
