@@ -16,6 +16,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.clearance_check import _row
 from vdsm_pin.verification.inside import LINKS_OUTSIDE, Place, check_inside
 from vdsm_pin.verification.records import (
     Check,
@@ -121,3 +122,23 @@ def test_each_row_says_how_much_of_what_was_looked_at_against_which_limit() -> N
     moments = {row.name: row.moment for row in verification.checks}
     assert moments["base on its rail"] == 40.0
     assert moments["clearance from obstacles"] >= 0.0
+
+
+def test_a_row_names_the_nearest_of_pairs_with_one_bound() -> None:
+    """Far pairs are bounded no better than what the whole motion keeps."""
+    least = SimpleNamespace(
+        lower=np.array([0.3, 0.2, 0.2]),
+        upper=np.array([0.31, 0.9, 0.21]),
+        verdict=np.zeros(3, dtype=np.int64),
+        interval=np.array([1, 84, 7]),
+        share=np.array([0.0, 0.0, 0.5]),
+    )
+    evidence: Any = SimpleNamespace(
+        pairs=["far", "rough", "near"],
+        least=least,
+        counts=np.array([[1, 0, 0]] * 3),
+        deepest=lambda pair, value: False,
+    )
+    empty = Check("clearance", Verdict.UNDECIDED, 0, nan, 0.1, "m")
+    row = _row(empty, evidence, np.arange(3))
+    assert (row.where, row.moment, row.worst) == ("near", 7.5, 0.2)

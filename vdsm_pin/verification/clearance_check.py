@@ -94,7 +94,9 @@ def _row(row: Check, evidence: Evidence, mine: IntArray) -> Check:
         values = np.where(lost, least.upper[mine], np.inf)
     elif counts[UNDECIDED]:
         verdict = Verdict.UNDECIDED
-    k, worst = int(mine[np.argmin(values)]), float(values.min())
+    # Of pairs with the same bound, as rough ones of far pairs, the nearest is named.
+    k = int(mine[np.lexsort((least.upper[mine], values))[0]])
+    worst = float(values.min())
     where = str(evidence.pairs[k])
     if verdict is Verdict.UNDECIDED:
         where += f"; {int(counts[UNDECIDED])} of {int(counts.sum())} undecided"
