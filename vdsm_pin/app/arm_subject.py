@@ -1,7 +1,10 @@
 """How motions of a snake arm are read, judged, repaired and written."""
 
+import math
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -11,8 +14,12 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.impasse import at_start
-from vdsm_pin.report.tables import write_cables, write_centres, write_link_angles
-from vdsm_pin.verification.brackets import ClearanceSink
+from vdsm_pin.report.tables import (
+    ClearanceCsv,
+    write_cables,
+    write_centres,
+    write_link_angles,
+)
 from vdsm_pin.verification.coal_arm import coal_reach
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import ArmVerification
@@ -40,16 +47,6 @@ class ArmSubject:
         """SHA-256 of the URDF that Pinocchio reads, in hexadecimal."""
         return load_arm(self.problem.manipulator).urdf_sha256
 
-    @property
-    def n_pairs(self) -> int:
-        """Number of pairs that are judged."""
-        return arm_assembly(self.problem).table.size
-
-    @property
-    def csv_reach(self) -> float:
-        """The distance up to which Coal measures; [m]."""
-        return coal_reach(self.problem)
-
     def read(self, file: Path) -> Trajectory:
         """Read the motion of a file."""
         arm, joined = self.problem.manipulator, self.options.interpolation
@@ -73,20 +70,24 @@ class ArmSubject:
     def judge(
         self,
         motion: Trajectory,
-        sinks: Sequence[ClearanceSink] = (),
-        reach: float | None = None,
+        table: Path | None = None,
         *,
+        all_pairs: bool = False,
         joint_error: bool = False,
     ) -> ArmVerification:
         """Verify a motion; see `verification.verify`."""
-        return verify(
-            self.problem,
-            motion,
-            sinks=sinks,
-            joint_error=joint_error,
-            deadline=self.options.deadline,
-            reach=reach,
+        deadline, asked = self.options.deadline, self.problem
+        judged = partial(
+            verify, asked, motion, joint_error=joint_error, deadline=deadline
         )
+        if table is None:
+            return judged()
+        reach = math.inf if all_pairs else coal_reach(asked)
+        n_pairs = arm_assembly(asked).table.size
+        with closing(ClearanceCsv(table, asked, n_pairs, reach)) as clearance:
+            found = judged(sinks=(clearance,), reach=reach)
+            clearance.write(found)
+        return found
 
     def is_of(self, verification: ArmVerification, motion: Trajectory) -> bool:
         """Whether a verification judged this motion, equal to the last bit."""

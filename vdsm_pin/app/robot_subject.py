@@ -1,9 +1,9 @@
 """How motions of any robot but a snake arm are read, judged, repaired and written."""
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,11 +13,11 @@ from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions, check_times, expect
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.report.robot_drawing import RobotDrawing
+from vdsm_pin.report.tables import ClearanceCsv
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.trajectory_files import moved, path_of, read_motion
-from vdsm_pin.verification.brackets import ClearanceSink
 
 if TYPE_CHECKING:  # few need repair or a certificate
     from vdsm_pin.certificate_writer.lines import Hashes
@@ -34,17 +34,10 @@ class RobotSubject:
     problem: Cell
     options: MotionOptions = NO_OPTIONS
 
-    csv_reach = inf
-
     @property
     def urdf_sha256(self) -> str:
         """SHA-256 of the URDF that Pinocchio reads, in hexadecimal."""
         return sha256(self.problem.robot.text.encode()).hexdigest()
-
-    @property
-    def n_pairs(self) -> int:
-        """Number of pairs that are judged."""
-        return self.problem.asked.table.size
 
     def read(self, file: Path) -> JointTrajectory:
         """Read the motion of a file."""
@@ -75,13 +68,17 @@ class RobotSubject:
     def judge(
         self,
         motion: JointTrajectory,
-        sinks: Sequence[ClearanceSink] = (),
-        reach: float | None = None,
+        table: Path | None = None,
         *,
+        all_pairs: bool = False,
         joint_error: bool = False,
     ) -> RobotVerification:
-        """Verify a motion; all arguments but `motion` are ignored, being of arms."""
+        """Verify a motion; `all_pairs` and `joint_error` are of arms."""
         found = verify_robot(self.problem, motion.path, self.options.deadline)
+        if table is not None:
+            n_pairs = len(found.pairs)
+            with closing(ClearanceCsv(table, self.problem, n_pairs)) as clearance:
+                clearance.write(found)
         return replace(found, motion=motion)
 
     def is_of(self, verification: RobotVerification, motion: JointTrajectory) -> bool:

@@ -14,7 +14,6 @@ from vdsm_pin.app.problems import read_robot
 from vdsm_pin.io.problem_file import arm_problem, read_document
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.records import Verification
 
 if TYPE_CHECKING:  # whoever verifies an arm needs no robots, and few need repair
@@ -42,17 +41,6 @@ class Subject(Protocol):
     def urdf_sha256(self) -> str:
         """SHA-256 of the URDF that Pinocchio reads, in hexadecimal."""
 
-    @property
-    def n_pairs(self) -> int:
-        """Number of pairs that are judged."""
-
-    @property
-    def csv_reach(self) -> float:
-        """Pairs proved farther apart than this have no row in clearance.csv; [m].
-
-        That holds of single intervals: each pair has a row of its least clearance.
-        """
-
     def read(self, file: Path) -> Any:
         """Read the motion of a file.
 
@@ -77,17 +65,18 @@ class Subject(Protocol):
     def judge(
         self,
         motion: Any,
-        sinks: Sequence[ClearanceSink] = (),
-        reach: float | None = None,
+        table: Path | None = None,
         *,
+        all_pairs: bool = False,
         joint_error: bool = False,
     ) -> Verification:
         """Verify a motion.
 
         Args:
             motion: As `read` or `checked` returned it.
-            sinks: Receive the clearance brackets of an arm in chunks, in order.
-            reach: Obstacles farther than this are left out of what they receive; [m].
+            table: Where clearance.csv goes; None for none. It has the least clearance
+                of each pair, of an arm the near pairs at every interval too.
+            all_pairs: Whether it has every pair of an arm at every interval.
             joint_error: Whether to look for the largest joint error of an arm that is
                 still certified.
         """

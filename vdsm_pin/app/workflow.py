@@ -3,8 +3,6 @@
 Nothing is judged here: problems are read, planned, verified and written down.
 """
 
-import math
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -36,7 +34,7 @@ from vdsm_pin.report.folder import (
     staged,
 )
 from vdsm_pin.report.run_record import RunRecord, now
-from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_centres
+from vdsm_pin.report.tables import write_cables, write_centres
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.pinocchio_arm import load_arm
 from vdsm_pin.verification.records import Verdict, Verification
@@ -228,7 +226,11 @@ def verify_into(order: VerifyOrder, given: Given, staging: Path) -> Verified:
     from vdsm_pin.report.html import write_report
 
     motion, digest, subject = given
-    verification = _judged(order, subject, motion, staging)
+    verification = subject.judge(
+        motion, staging / CLEARANCE, all_pairs=order.all_pairs, joint_error=True
+    )
+    step("writing the results")
+    subject.write_tables(staging, verification)
     check_unchanged(order.trajectory, digest)
     source, urdf = order.problem.source, subject.urdf_sha256
     record = RunRecord.of(order.command, source, urdf, digest, order.date)
@@ -238,20 +240,6 @@ def verify_into(order: VerifyOrder, given: Given, staging: Path) -> Verified:
     # Last inside: a certificate that cannot be written leaves no half of a result.
     missing = _certify(order, subject, verification, record)
     return Verified(file, verification, missing)
-
-
-def _judged(
-    order: VerifyOrder, subject: Subject, motion: Any, staging: Path
-) -> Verification:
-    """Verify a motion, and write clearance.csv and the tables of its kind."""
-    reach = math.inf if order.all_pairs else subject.csv_reach
-    table = ClearanceCsv(staging / CLEARANCE, order.problem, subject.n_pairs, reach)
-    with closing(table) as clearance:
-        verification = subject.judge(motion, (clearance,), reach, joint_error=True)
-        clearance.write(verification)
-    step("writing the results")
-    subject.write_tables(staging, verification)
-    return verification
 
 
 def _check_outputs(order: VerifyOrder) -> None:
