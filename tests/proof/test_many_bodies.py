@@ -285,3 +285,19 @@ def test_nothing_is_read_that_was_not_written(
     found = prove(tree, bodies, path, pairs)
     assert same_arrays(found, usual, [one.name for one in fields(Proof)])
     assert max(shape[0] for shape in shapes) > FEW_PLACES
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_generators_that_no_error_wrote_are_not_read(seed: int) -> None:
+    """Room for them holds anything at first, whatever numbers or none."""
+    rng = np.random.default_rng([seed, 39])
+    tree, bodies, path = random_scene(rng)
+    n, found = len(tree.joints), []
+    box = ErrorBox(rng.choice([0.0, 0.02], n), np.zeros(n), rng.choice([0.0, 0.02], n))
+    for filling in (0.0, np.nan, 1e9):
+        made, _ = start_proof(tree, bodies, path, PairTable.of(pairs_of(bodies)), box)
+        made.work.space.body.swings[:] = filling
+        assert made.work.space.body.swings.size and made.run()
+        found.append(made.results)
+    for one in found[1:]:
+        assert same_arrays(one, found[0], ["best", "counts", "limit", "tally"])
