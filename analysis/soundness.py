@@ -60,10 +60,11 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.bodies import ErrorBox as ProofBox
+from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
-from vdsm_pin.proof.proving import Budget, new_proving, rounding_pad
+from vdsm_pin.proof.proving import new_proving
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance

@@ -6,9 +6,10 @@ from pathlib import Path as File
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, ErrorBox, PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.parts import PartPlan
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Budget, Proving
+from vdsm_pin.proof.proving import Proving
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.model import Robot

@@ -14,6 +14,7 @@ from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.proof import bends as slices
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.cached_planes import served
 from vdsm_pin.proof.error_growth import crude_growth, grow_corners, set_direction
 from vdsm_pin.proof.layouts import OWN_POINT, POINT, SUPPORT
@@ -27,7 +28,7 @@ from vdsm_pin.proof.plane_bounds import (
     take_disc,
 )
 from vdsm_pin.proof.prover import prove
-from vdsm_pin.proof.proving import Budget, dense_rows
+from vdsm_pin.proof.proving import dense_rows
 from vdsm_pin.proof.results import own_up
 from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.rows import BLOCK

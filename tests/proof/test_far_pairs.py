@@ -11,11 +11,12 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof import boxes, broad_phase, far_pairs, row_places
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.pair_sweep import Stretch
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Budget, dense_rows, new_results
+from vdsm_pin.proof.proving import dense_rows, new_results
 from vdsm_pin.proof.terms import ACROSS, CERTIFIED, UNDECIDED, Rules, Task
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.proof.workspace import new_workspace

@@ -8,12 +8,13 @@ from oracles.tree_queries import random_box, random_tree, unit
 
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, ends_of
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.moving_sides import FEW
 from vdsm_pin.proof.packed_tree import FIXED, PRISMATIC, REVOLUTE, pack_tree
 from vdsm_pin.proof.packing import for_motion, pack_task, with_errors
 from vdsm_pin.proof.parts import planned_parts
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Budget, new_proving
+from vdsm_pin.proof.proving import new_proving
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import ACROSS, WITHIN, WORLD, Rules
 from vdsm_pin.proof.tree import Joint, Kind, Tree

@@ -12,9 +12,9 @@ from some_slow import few_of
 
 from vdsm_pin.geometry.convex import HalfSpacePiece, Hull
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path, together
 from vdsm_pin.proof.prover import Proof, prove, summed, verdicts_of
-from vdsm_pin.proof.proving import Budget
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted

@@ -10,10 +10,10 @@ from oracles.tree_queries import at, random_path, random_pieces, random_tree, un
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
-from vdsm_pin.proof.proving import Budget
 from vdsm_pin.proof.recording import LOSS, record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.tree import Tree

@@ -16,6 +16,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof import search, stretches
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -35,7 +36,7 @@ from vdsm_pin.proof.packing import with_errors
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
-from vdsm_pin.proof.proving import Budget, Proving, dense_rows
+from vdsm_pin.proof.proving import Proving, dense_rows
 from vdsm_pin.proof.results import Dense
 from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.rows import BLOCK

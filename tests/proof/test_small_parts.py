@@ -31,6 +31,7 @@ from vdsm_pin.proof import (
     witnesses,
 )
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
+from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -54,7 +55,7 @@ from vdsm_pin.proof.packed_tree import pack_tree
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import RANK
-from vdsm_pin.proof.proving import Budget, new_results, room_for, rounding_pad
+from vdsm_pin.proof.proving import new_results, room_for
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import new_tracks
 from vdsm_pin.proof.terms import (

@@ -33,8 +33,8 @@ from vdsm_pin.certificate_writer.schema import (
     RobotHeaderLine,
 )
 from vdsm_pin.problem.trajectory import JOINED
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.parts import PartPlan
-from vdsm_pin.proof.proving import Budget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.inside import (

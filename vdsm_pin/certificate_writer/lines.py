@@ -25,9 +25,9 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.source import MAX_LINE
 from vdsm_pin.progress import step, watched
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.motions import Motion
-from vdsm_pin.proof.proving import Budget
 from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import new_workspace

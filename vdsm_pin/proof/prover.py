@@ -13,10 +13,10 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OWN, TIME, UP
 from vdsm_pin.proof.parts import PartPlan
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Budget
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED

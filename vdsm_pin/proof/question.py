@@ -10,10 +10,11 @@ import numpy as np
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.pieces import PackedPieces, joined_pieces, pack_pieces
 from vdsm_pin.proof.bodies import Body, ErrorBox, PairTable
+from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.packing import for_motion, pack_task
 from vdsm_pin.proof.parts import PartPlan, planned_parts, with_rough
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Budget, Proving, new_proving, rounding_pad
+from vdsm_pin.proof.proving import Proving, new_proving
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.tree import Tree, added_up
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Budget
 from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.time_limit import NO_LIMIT, Deadline

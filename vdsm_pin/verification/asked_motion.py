@@ -9,9 +9,10 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, answer, summed
-from vdsm_pin.proof.proving import Budget, Proving
+from vdsm_pin.proof.proving import Proving
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.results import Results
 from vdsm_pin.verification.assembly import Assembly

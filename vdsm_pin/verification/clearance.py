@@ -18,9 +18,10 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step, watched
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import LOW, TALLY
 from vdsm_pin.proof.prover import RANK
-from vdsm_pin.proof.proving import Budget, Proving, dense_rows, room_for
+from vdsm_pin.proof.proving import Proving, dense_rows, room_for
 from vdsm_pin.proof.results import Dense
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED

@@ -9,7 +9,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray
 from vdsm_pin.problem.any_problem import AnyMotion, AnyProblem
-from vdsm_pin.proof.proving import Budget
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline

@@ -21,8 +21,8 @@ from vdsm_pin.geometry.winding import Location, Side, locate
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.proof.bodies import PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.prover import answer
-from vdsm_pin.proof.proving import Budget
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline

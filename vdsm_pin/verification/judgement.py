@@ -26,7 +26,7 @@ from vdsm_pin.problem.error_boxes import NO_ERRORS
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
-from vdsm_pin.proof.proving import Budget
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES

@@ -15,7 +15,7 @@ from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import covers_of
-from vdsm_pin.proof.proving import rounding_pad
+from vdsm_pin.proof.budget import rounding_pad
 from vdsm_pin.tolerances import TOLERANCES
 
 

@@ -13,7 +13,7 @@ from vdsm_pin.geometry.winding import Side
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import with_hulls
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.proving import Budget
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.asked_motion import AskedMotion

@@ -8,8 +8,8 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.packing import with_errors
-from vdsm_pin.proof.proving import Budget
 from vdsm_pin.proof.workspace import forget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
