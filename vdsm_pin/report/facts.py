@@ -58,10 +58,9 @@ def in_file_frame(verification: Verification, point: FloatArray) -> Point | None
 def check_row(check: Check, time: float | None = None) -> CheckRow:
     """One check as its row, with the time of its moment where that is known; [s]."""
     known = asdict(check) | {"verdict": check.verdict.value}
-    for name, value in known.items():
-        missing = name.startswith("too_close") and not value
-        missing |= isinstance(value, float) and not np.isfinite(value)
-        known[name] = None if missing else value
+    known = {k: finite(v) if isinstance(v, float) else v for k, v in known.items()}
+    for name in ("too_close_intervals", "too_close_stretches"):
+        known[name] = known[name] or None  # 0: not counted
     return CheckRow(**known, time_s=time)
 
 

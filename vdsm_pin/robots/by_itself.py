@@ -149,8 +149,8 @@ def pose_check(robot: Robot, path: Path) -> Check:
     good = bool((off <= POSE_ERROR).all())
     verdict = Verdict.CERTIFIED if good else Verdict.REFUTED
     where = f"{len(robot.frames)} links at {len(rows)} of {len(path.knots)} waypoints"
-    count, told = len(rows) * len(robot.frames), (POSE_ERROR, "-", where)
-    return Check(POSES, verdict, count, float(off[k]), *told, float(rows[k]))
+    count, worst, when = len(rows) * len(robot.frames), float(off[k]), float(rows[k])
+    return Check(POSES, verdict, count, worst, POSE_ERROR, "-", where, moment=when)
 
 
 def checks_by_itself(robot: Robot, path: Path) -> list[Check]:
@@ -186,15 +186,18 @@ def rate_checks(joints: tuple[RobotJoint, ...], path: Path) -> list[Check]:
         for k in np.flatnonzero(np.isfinite(limits)):
             joint = joints[k]
             name = f"joint {joint.name!r} in its {word} limit"
-            unit = joint.unit + ("/s" if order == 1 else "/s^2")
-            if order > path.degree:
-                where = "straight lines change their rates at once"
-                none = Verdict.UNDECIDED, path.n_intervals, nan
-                checks.append(Check(name, *none, float(limits[k]), unit, where))
-                continue
-            limit, each = float(limits[k]), [(0, controls[:, :, k, None])]
-            most = limit * (1.0 + TOLERANCES.arithmetic)
-            found = largest(each, np.abs, most)
-            told = found.verdict(most), path.n_intervals, found.worst(most), limit
-            checks.append(Check(name, *told, unit, joint.whose, found.moment))
+            unit, limit = (
+                joint.unit + ("/s" if order == 1 else "/s^2"),
+                float(limits[k]),
+            )
+            verdict, worst, moment = Verdict.UNDECIDED, nan, nan
+            where = "straight lines change their rates at once"
+            if order <= path.degree:
+                most = limit * (1.0 + TOLERANCES.arithmetic)
+                found = largest([(0, controls[:, :, k, None])], np.abs, most)
+                verdict, worst = found.verdict(most), found.worst(most)
+                where, moment = joint.whose, found.moment
+            count = path.n_intervals
+            row = Check(name, verdict, count, worst, limit, unit, where, moment=moment)
+            checks.append(row)
     return checks

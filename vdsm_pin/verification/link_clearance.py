@@ -19,9 +19,7 @@ from vdsm_pin.proof.budget import rounding_pad
 from vdsm_pin.tolerances import TOLERANCES
 
 
-def arithmetic_pad(
-    problem: PlanningProblem, pieces: PackedPieces, beside: float = 0.0
-) -> float:
+def arithmetic_pad(problem: PlanningProblem, pieces: PackedPieces) -> float:
     """Bound of all rounding in one clearance evaluation for this problem; [m].
 
     `TOLERANCES.arithmetic` holds within `TOLERANCES.scene_extent`; rounding grows in
@@ -30,12 +28,11 @@ def arithmetic_pad(
     Args:
         problem: The arm.
         pieces: The scene.
-        beside: What joints that carry obstacles add up to; [m], [rad].
     """
     arm = problem.manipulator
     values = pieces.points, pieces.centre, pieces.radius, pieces.extent
     largest = [np.abs(one).max(initial=arm.total_length) for one in values]
-    return rounding_pad(float(max(beside, *largest, *np.abs(arm.base_range))))
+    return rounding_pad(float(max(*largest, *np.abs(arm.base_range))))
 
 
 def link_clearance(problem: PlanningProblem) -> Callable[..., FloatArray]:
