@@ -19,8 +19,7 @@ from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.verification.clearance_check import LINKS, OBSTACLES
-from vdsm_pin.verification.records import Verdict, combine
+from vdsm_pin.verification.records import CLEARANCES, Verdict, combine
 
 DENSITIES: Final = ("0.01", "0.005", "1 deg", "1 mm")
 """Of samples: parts of the space's extent, the fastest joint, the fastest frame."""
@@ -96,7 +95,7 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
         cell = Cell(robot, scene)
         found = verify_robot(cell, motion, contacts=False)
         spent = min(spent, 1e3 * (time.process_time() - begin))
-    about = [one.verdict for one in found.checks if one.name in (OBSTACLES, LINKS)]
+    about = [one.verdict for one in found.checks if one.name in CLEARANCES]
     verdict = combine(tuple(about))
     extent = np.linalg.norm(np.ptp(sampled.limits, axis=0))
     states = [_samples(rows, count) for count in _counts(sampled, float(extent))]

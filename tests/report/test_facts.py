@@ -6,8 +6,7 @@ from dataclasses import replace
 import made_up
 
 from vdsm_pin.report.reason import failing, reason
-from vdsm_pin.verification.clearance_check import OBSTACLES
-from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.records import Check, CheckKind, Verdict
 
 
 def test_the_check_that_decides_comes_first() -> None:
@@ -22,7 +21,10 @@ def test_the_check_that_decides_comes_first() -> None:
 
 
 def test_a_check_without_evidence_is_not_said_to_have_a_value() -> None:
-    for name, worst in (("tip on the path", math.nan), (OBSTACLES, -math.inf)):
+    for name, worst in (
+        ("tip on the path", math.nan),
+        (CheckKind.OBSTACLES, -math.inf),
+    ):
         empty = Check(name, Verdict.UNDECIDED, 0, worst, 1e-6, "m")
         told = reason(replace(made_up.verification(), checks=(empty,)))
         assert f'there is no evidence for "{name}"' in told

@@ -23,9 +23,7 @@ from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.reason import reason
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
-from vdsm_pin.verification.clearance_check import OBSTACLES
-from vdsm_pin.verification.inside import LINKS_OUTSIDE
-from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.records import CheckKind, Verdict
 
 URDF = """<robot name="one"><link name="base"/>
   <link name="arm"><collision><origin xyz="0.5 0 0"/>
@@ -82,7 +80,7 @@ def test_verdicts_are_those_of_solid_angles(seed: int, tmp_path: Path) -> None:
     mesh.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
     mesh.apply_translation(np.array([0.5, 0.0, 0.0]) + rng.uniform(-0.4, 0.4, 3))
     result = judged(cell_in(tmp_path, mesh), tmp_path)
-    (row,) = (check for check in result.checks if check.name == LINKS_OUTSIDE)
+    (row,) = (check for check in result.checks if check.name == CheckKind.LINKS_OUTSIDE)
     inside = abs(winding(mesh, np.array([0.5, 0.0, 0.0]))) > 0.5
     assert row.verdict is (Verdict.REFUTED if inside else Verdict.CERTIFIED)
     if inside:
@@ -90,7 +88,9 @@ def test_verdicts_are_those_of_solid_angles(seed: int, tmp_path: Path) -> None:
         assert row.where == "link 'arm' is inside 'shell'"
         assert result.closest(1)[0].upper <= 0.0
         np.testing.assert_allclose(result.closest(1)[0].link_point, [0.5, 0, 0])
-        clear = next(check for check in result.checks if check.name == OBSTACLES)
+        clear = next(
+            check for check in result.checks if check.name == CheckKind.OBSTACLES
+        )
         assert clear.first_moment == 0.0
         assert clear.where == "link 'arm' is inside 'shell'"
 
@@ -111,7 +111,9 @@ def test_an_inside_that_cannot_be_told_is_undecided_or_far(tmp_path: Path) -> No
     bowl.apply_translation([0.5, 0.0, 0.0])
     result = judged(cell_in(tmp_path, bowl), tmp_path)
     assert result.verdict is Verdict.UNDECIDED
-    row = next(check for check in result.checks if check.name == LINKS_OUTSIDE)
+    row = next(
+        check for check in result.checks if check.name == CheckKind.LINKS_OUTSIDE
+    )
     assert row.where.startswith(
         "whether link 'arm' is inside 'shell' cannot be decided"
     )

@@ -21,9 +21,8 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.judgement import verify_robot
-from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.moving import PART, Knots, in_short_parts
-from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.records import CheckKind, Verdict
 
 URDF = """<robot name="two"><link name="base"/>
   <link name="upper"><collision><origin xyz="0.5 0 0"/>
@@ -112,7 +111,7 @@ def test_a_ball_too_early_is_refuted_and_in_time_is_not(tmp_path: Path) -> None:
     result = verify_robot(early, Motion(rows, times=times))
     assert result.verdict is Verdict.REFUTED
     assert result.closest(1)[0].pair.obstacle == "ball"
-    row = next(check for check in result.checks if check.name == OBSTACLES)
+    row = next(check for check in result.checks if check.name == CheckKind.OBSTACLES)
     assert row.moment == pytest.approx(0.0, abs=0.05)
 
 

@@ -25,9 +25,8 @@ from vdsm_pin.robots.judgement import NEAR, verify_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
-from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.records import CheckKind, Verdict
 
 URDF = """<robot name="two">
   <link name="base"><collision>
@@ -122,7 +121,7 @@ def test_what_grazes_for_a_moment_is_decided(
     wall = Box("wall", centre, np.eye(3), half)
     bar = read_robot(RobotFiles(write(tmp_path, "bar.urdf", text)))
     found = verify_robot(Cell(bar, Scene((wall,))), Motion(np.array(ends)[:, None]))
-    (row,) = (one for one in found.checks if one.name == OBSTACLES)
+    (row,) = (one for one in found.checks if one.name == CheckKind.OBSTACLES)
     assert row.verdict is (Verdict.REFUTED if depth > 0.0 else Verdict.CERTIFIED)
     assert -depth / 2.0 <= row.worst < 0.0 if depth > 0.0 else row.worst <= -depth
 

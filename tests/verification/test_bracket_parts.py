@@ -50,8 +50,6 @@ from vdsm_pin.verification.clearance import (
     prove_clearance,
 )
 from vdsm_pin.verification.clearance_check import (
-    LINKS,
-    OBSTACLES,
     Evidence,
     clearance_checks,
 )
@@ -76,7 +74,13 @@ from vdsm_pin.verification.moving import (
     in_short_parts,
     whole_rows,
 )
-from vdsm_pin.verification.records import Check, Counterexample, Pair, Verdict
+from vdsm_pin.verification.records import (
+    Check,
+    CheckKind,
+    Counterexample,
+    Pair,
+    Verdict,
+)
 from vdsm_pin.verification.task import arm_assembly
 
 ARM = built_in("hrm8")
@@ -523,7 +527,10 @@ def test_a_row_of_clearance_is_its_worst_pair(late: bool) -> None:
         )  # fmt: skip
         rows = clearance_checks(asked, evidence, Deadline(3.0) if late else None)
         expected = []
-        for name, limit, kind in ((OBSTACLES, 0.03, True), (LINKS, 0.04, False)):
+        for name, limit, kind in (
+            (CheckKind.OBSTACLES, 0.03, True),
+            (CheckKind.LINKS, 0.04, False),
+        ):
             mine = [k for k in range(n) if bool(pairs[k].obstacle) is kind]
             if mine:
                 expected.append((name, limit, mine))

@@ -13,7 +13,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import fk
 from vdsm_pin.verification.fk import CHUNK, check_fk
 from vdsm_pin.verification.pinocchio_arm import load_arm
-from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.records import CheckKind, Verdict
 from vdsm_pin.verification.verify import verify
 
 HRM8 = built_in("hrm8")
@@ -90,7 +90,7 @@ def test_planned_centres_are_held_against_pinocchio() -> None:
     assert (check.moment, check.where) == (CHUNK + 3, "joint centre O7")
     judged = verify(problem_for(HRM8), rows.part(CHUNK, CHUNK + 9),
                     centres=centres[CHUNK : CHUNK + 9])  # fmt: skip
-    row = next(check for check in judged.checks if check.name == fk.PLANNED)
+    row = next(check for check in judged.checks if check.name == CheckKind.PLANNED)
     assert row.verdict is Verdict.REFUTED
 
 

@@ -17,9 +17,10 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance_check import _row
-from vdsm_pin.verification.inside import LINKS_OUTSIDE, Place, check_inside
+from vdsm_pin.verification.inside import Place, check_inside
 from vdsm_pin.verification.records import (
     Check,
+    CheckKind,
     Pair,
     Verdict,
     _place,
@@ -73,7 +74,11 @@ def test_the_row_of_meshes_counts_those_that_decide_it(
     asked: Any = SimpleNamespace(chain=0, pair=lambda k: Pair(1, [*sides][k]))
     places = {k: Place(one, np.zeros(3)) for k, one in enumerate(sides.values())}
     (row,) = check_inside(asked, places)
-    assert (row.name, row.verdict, row.count) == (LINKS_OUTSIDE, verdict, len(sides))
+    assert (row.name, row.verdict, row.count) == (
+        CheckKind.LINKS_OUTSIDE,
+        verdict,
+        len(sides),
+    )
     assert (row.worst, row.limit, row.unit) == (float(len(bad)), 0.0, "-")
     assert row.where == "; ".join(sides[name].words(name) for name in bad)
     assert [row.moment] == pytest.approx([0.0 if bad else nan], nan_ok=True)

@@ -31,6 +31,9 @@ from vdsm_pin.tolerances import TOLERANCES
 NEAR: Final = 5.0 * TOLERANCES.mesh_gap
 """Boxes of triangles that near, over the mesh's size, may be of one surface; [-]."""
 
+MEET: Final = "meet at joint"
+"""How the reason begins why links next to each other are not held apart."""
+
 DIRECTIONS: Final = 256
 """Directions in which the corners of a hull are sought first."""
 
@@ -285,7 +288,7 @@ def _reason(arm: Manipulator, near: ArmBody, far: ArmBody) -> str:
         length = arm.link_lengths[near.link - 1] if near.link else 0.0
         gap = (length - near.corners[1, 0]) + far.corners[0, 0]
         if gap <= near.ball + far.ball:
-            return f"meet at joint {far.link} in every pose"
+            return f"{MEET} {far.link} in every pose"
     if arm.ignores(near.name, far.name):
         return BY_FILE
     return ""

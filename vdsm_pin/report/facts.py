@@ -31,10 +31,10 @@ from vdsm_pin.report.rows import (
 from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.words import finite
 from vdsm_pin.tolerances import TOLERANCES, UNITS
-from vdsm_pin.verification.fk import PLANNED
 from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
+    CheckKind,
     ClosestApproach,
     Counterexample,
     Pair,
@@ -229,6 +229,7 @@ def tolerances() -> dict[str, ToleranceRow]:
 def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
     """plan.json of one plan, its rounds and the verification it was accepted with."""
     plan, verification = refinement.plan, refinement.verification
+    checks = verification.checks
     return PlanFile(
         problem=plan.problem.name,
         strategy=plan.strategy,
@@ -252,7 +253,7 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
             for one in ended.adjustments
         ),
         centres_error_m=next(
-            (finite(c.worst) for c in verification.checks if c.name == PLANNED), None
+            (finite(c.worst) for c in checks if c.name == CheckKind.PLANNED), None
         ),
         error_box=error_box(verification.errors, plan.trajectory.n_links),
         coverage=finite(verification.coverage),

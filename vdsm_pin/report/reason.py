@@ -5,23 +5,29 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Final
 
+from vdsm_pin.arm.bodies import MEET
 from vdsm_pin.io.tables import listed
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.rows import LeftOutRow
 from vdsm_pin.report.words import (
     at_least,
-    at_most,
     check_cells,
     finite,
     percent,
     place,
     quantity,
+    rounding,
 )
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.clearance_check import LINKS, OBSTACLES
-from vdsm_pin.verification.inside import ARM_OUTSIDE, LINKS_OUTSIDE, surfaces
-from vdsm_pin.verification.records import ArmVerification, Check, Verdict, Verification
+from vdsm_pin.verification.inside import surfaces
+from vdsm_pin.verification.records import (
+    ArmVerification,
+    Check,
+    CheckKind,
+    Verdict,
+    Verification,
+)
 from vdsm_pin.verification.task import ignored_pairs
 
 _PASSED: Final = Verdict.CERTIFIED
@@ -61,8 +67,8 @@ def reason(verification: Verification) -> str:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
     worst, asked = check_cells(first)
-    found = f"{first.name} is {_bound(first, worst)}{worst}"
-    inside = first.name in (ARM_OUTSIDE, LINKS_OUTSIDE)
+    found = f"{first.name} is {_bound(first)}{worst}"
+    inside = first.name in (CheckKind.ARM_OUTSIDE, CheckKind.LINKS_OUTSIDE)
     if inside:
         found = first.where
     elif not math.isfinite(first.worst):
@@ -81,16 +87,17 @@ def reason(verification: Verification) -> str:
     return f"{undecided} This counts as not passed."
 
 
-def _bound(check: Check, told: str) -> str:
+def _bound(check: Check) -> str:
     """What the worst value of a check that did not pass is of the true one, in words.
 
     A clearance that is refuted is as small as two points are apart, perhaps smaller;
     where it is told rounded down, lest it reads as its limit, it is not at most that.
     """
-    if check.name not in (LINKS, OBSTACLES) or check.deeper:
+    whole = rounding(check)
+    if whole is None or check.deeper:
         return ""
     if check.verdict is Verdict.REFUTED:
-        return "at most " if told == at_most(check.worst) else ""
+        return "at most " if whole is math.ceil else ""
     return "proved to be at least "
 
 
@@ -160,7 +167,7 @@ def left_out_words(rows: Sequence[LeftOutRow]) -> str:
     """The same in one sentence, each reason of links next to each other once."""
     words, joints = [], 0
     for row in rows:
-        if row.reason.startswith("meet at joint") and row.other.startswith("link"):
+        if row.reason.startswith(MEET) and row.other.startswith("link"):
             joints += 1
         else:
             words.append(f"{row.body} and {row.other} ({row.reason})")

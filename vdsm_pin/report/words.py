@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.records import CLEARANCES
 
 MISSING: Final = "not available"
 """What stands where there is no evidence; never a pass."""
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 
 Whole: TypeAlias = Callable[[float], int]
 """How a number is rounded to whole ones."""
-
-_CLEARANCE: Final = "clearance "
-"""How the names of checks of clearances begin."""
 
 _NOISE_DIGITS: Final = 6  # of the last digit; what rounding leaves of 5.0 mm is 5.0
 
@@ -186,21 +184,26 @@ def kept_at_least(row: "ClosestRow | MinClearance") -> str:
     return at_least(lower, row.deeper and most)
 
 
-def check_cells(row: "CheckRow | Check") -> tuple[str, str]:
-    """Worst value and limit of a check.
+def rounding(row: "CheckRow | Check") -> Whole | None:
+    """How the worst value of a check is rounded; None for to the nearest.
 
     A clearance is rounded to the safe side of what is proved of it: down, and up where
-    it is refuted by what it does not exceed, unless that reads as its limit.
+    it is refuted by what it does not exceed, unless that alone reads as its limit.
     """
-    refuted = row.verdict == "refuted"
-    whole: Whole | None = None
-    if row.name.startswith(_CLEARANCE):
-        whole = math.ceil if refuted else math.floor
-    asked = limit(row.limit, row.unit, None if refuted else whole)
-    worst = depth(row.worst, row.deeper, row.unit, whole)
-    if refuted and whole and worst == asked:
-        worst = depth(row.worst, row.deeper, row.unit, math.floor)
-    return worst, asked
+    if row.name not in CLEARANCES:
+        return None
+    if row.verdict != "refuted":
+        return math.floor
+    both = math.floor, math.ceil
+    down, up = (depth(row.worst, row.deeper, row.unit, one) for one in both)
+    return math.floor if down != up == limit(row.limit, row.unit) else math.ceil
+
+
+def check_cells(row: "CheckRow | Check") -> tuple[str, str]:
+    """Worst value and limit of a check."""
+    whole = rounding(row)
+    asked = limit(row.limit, row.unit, None if row.verdict == "refuted" else whole)
+    return depth(row.worst, row.deeper, row.unit, whole), asked
 
 
 def measured(value: float | None, unit: str) -> str:

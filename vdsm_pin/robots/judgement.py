@@ -16,13 +16,12 @@ from vdsm_pin.robots.cell import Cell
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
-from vdsm_pin.verification.clearance_check import LINKS
 from vdsm_pin.verification.coal_check import CoalEvidence
 from vdsm_pin.verification.coal_shapes import Sides, disagreement
 from vdsm_pin.verification.inside import located
 from vdsm_pin.verification.judgement import BestEffort, judge_clearance
 from vdsm_pin.verification.limits import checks_of_others
-from vdsm_pin.verification.records import Check, Verdict, Verification
+from vdsm_pin.verification.records import Check, CheckKind, Verdict, Verification
 
 NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
 WIDTH: Final = 0.2
@@ -91,7 +90,7 @@ def verify_robot(
 def _no_pair(cell: Cell) -> Check:
     """The row of a robot of which nothing is held apart."""
     needed = cell.required_self_clearance
-    return Check(LINKS, Verdict.UNDECIDED, 0, nan, needed, "m", NO_PAIR)
+    return Check(CheckKind.LINKS.value, Verdict.UNDECIDED, 0, nan, needed, "m", NO_PAIR)
 
 
 def _coal(

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, isnan, nan
-from typing import Final
 
 import numpy as np
 
@@ -17,13 +16,11 @@ from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import (
     Check,
+    CheckKind,
     Counterexample,
     Pair,
     Verdict,
 )
-
-OBSTACLES: Final = "clearance from obstacles"
-LINKS: Final = "clearance between links"
 
 
 @dataclass(frozen=True)
@@ -62,14 +59,15 @@ def clearance_checks(
         late: When the proof had to end, where it did not in time.
     """
     rows = []
-    for kind, name, needed in (
-        (True, OBSTACLES, problem.required_clearance),
-        (False, LINKS, problem.required_self_clearance),
+    for kind, one, needed in (
+        (True, CheckKind.OBSTACLES, problem.required_clearance),
+        (False, CheckKind.LINKS, problem.required_self_clearance),
     ):
         mine = np.flatnonzero(evidence.outer == kind)
         if not mine.size:
             continue
-        row = _row(Check(name, Verdict.CERTIFIED, 0, nan, needed, "m"), evidence, mine)
+        row = Check(one.value, Verdict.CERTIFIED, 0, nan, needed, "m")
+        row = _row(row, evidence, mine)
         if late is not None and row.verdict is Verdict.UNDECIDED:
             row = replace(row, where=f"{row.where}: {OutOfTime(late.limit)}")
         for contact in evidence.contacts:

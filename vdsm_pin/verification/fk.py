@@ -12,7 +12,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.pinocchio_arm import PinocchioArm
-from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.records import Check, CheckKind, Verdict
 
 CHUNK: Final = 4096
 """Rows held in memory at a time."""
@@ -20,9 +20,6 @@ CHUNK: Final = 4096
 
 NAME: Final = "joint centres by Pinocchio against the closed form"
 """Name of the row."""
-
-PLANNED: Final = "joint centres by Pinocchio against the planned ones"
-"""Name of the row about the centres that the angles were solved from."""
 
 
 def check_fk(
@@ -51,7 +48,8 @@ def check_fk(
     Raises:
         OutOfTime: If the time is over.
     """
-    found = [_Worst(NAME)] if centres is None else [_Worst(NAME), _Worst(PLANNED)]
+    planned = [] if centres is None else [_Worst(CheckKind.PLANNED.value)]
+    found = [_Worst(NAME), *planned]
     for first in range(0, trajectory.n_samples, CHUNK):
         deadline.check()
         part = slice(first, first + CHUNK)

@@ -30,11 +30,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.assembly import Assembly
-from vdsm_pin.verification.records import Check, Verdict, combine
-
-ARM_OUTSIDE: Final = "arm outside the meshes"
-LINKS_OUTSIDE: Final = "links outside the meshes"
-"""Names of the row of evidence: of a snake arm, and of any other robot."""
+from vdsm_pin.verification.records import Check, CheckKind, Verdict, combine
 
 VERDICTS: Final = {
     Side.INSIDE: Verdict.REFUTED,
@@ -206,6 +202,7 @@ def check_inside(asked: Assembly, places: Places) -> tuple[Check, ...]:
     if not places:
         return ()
     meshes = by_mesh(asked, places)
+    kind = CheckKind.ARM_OUTSIDE if asked.chain else CheckKind.LINKS_OUTSIDE
     verdict = combine(tuple(VERDICTS[found.side] for found in meshes.values()))
     bad = {
         name: found
@@ -214,7 +211,7 @@ def check_inside(asked: Assembly, places: Places) -> tuple[Check, ...]:
     }
     return (
         Check(
-            name=ARM_OUTSIDE if asked.chain else LINKS_OUTSIDE,
+            name=kind.value,
             verdict=verdict,
             count=len(meshes),
             worst=float(len(bad)),

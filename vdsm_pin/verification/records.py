@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import inf, isfinite, nan
+from typing import Final
 
 import numpy as np
 
@@ -39,12 +40,26 @@ def combine(verdicts: tuple[Verdict, ...]) -> Verdict:
     return Verdict.CERTIFIED if verdicts else Verdict.UNDECIDED
 
 
+class CheckKind(StrEnum):
+    """Rows of evidence that others look for; each value is the name of the row."""
+
+    OBSTACLES = "clearance from obstacles"
+    LINKS = "clearance between links"
+    ARM_OUTSIDE = "arm outside the meshes"
+    LINKS_OUTSIDE = "links outside the meshes"
+    PLANNED = "joint centres by Pinocchio against the planned ones"
+
+
+CLEARANCES: Final = frozenset({CheckKind.OBSTACLES, CheckKind.LINKS})
+"""Of lengths that are proved from one side."""
+
+
 @dataclass(frozen=True)
 class Check:
     """One row of evidence.
 
     Args:
-        name: What was checked, in field terms.
+        name: What was checked, in field terms; a `CheckKind` where others look for it.
         verdict: Its outcome; a check with count 0 is never certified.
         count: Items checked.
         worst: The worst value found or bounded; NaN where there is none.
