@@ -33,8 +33,8 @@ from vdsm_pin.planner.paper.online import OnlineRule
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.motion_facts import changed_angles, motion_facts
-from vdsm_pin.report.words import at_least, quantity
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.report.words import at_least
+from vdsm_pin.units import MM_PER_M, quantity
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify

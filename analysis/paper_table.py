@@ -20,9 +20,9 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.feasibility import curled_reach, straight_reach
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Refinement, plan_and_verify
-from vdsm_pin.report.words import at_least, quantity
+from vdsm_pin.report.words import at_least
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MM_PER_M, quantity
 from vdsm_pin.verification.robust import largest_joint_error
 
 SCENES: Final = ("free", "obs1", "obs2", "obs2-small", "obs3")

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from html import escape
-from math import floor
 from types import MappingProxyType
 from typing import Final
 
@@ -36,8 +35,3 @@ class Summarised:
             for name, value in self.summary()
         )
         return f"<table>{''.join(cells)}</table>"
-
-
-def in_percent(share: float) -> str:
-    """A share from 0 to 1 in words, rounded down; rounding noise is nothing."""
-    return f"{floor(round(share, 9) * 1000.0) / 10.0:.1f} %"

@@ -8,7 +8,6 @@ same way. Coal proposes, the bracket proves: a motion with a failed check is nev
 handed out as a plan.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil, floor
 from typing import Final
@@ -31,7 +30,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import in_mm
+from vdsm_pin.units import in_mm, quantity
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ArmVerification, Verdict
 from vdsm_pin.verification.robust import (
@@ -213,17 +212,17 @@ def _chosen(problem: PlanningProblem, plan: Plan, deadline: Deadline) -> Plan:
     plans, planned, none = (*plan.rivals, plan), plan.problem, ErrorBox()
     motions = [one.trajectory for one in plans]
     best, error = sturdiest(planned, motions, deadline)
+    kept = quantity(error, "rad", floor)
     note = (
-        f"every joint may be off by {_thousandths(error, floor)} at once (proved); of "
+        f"every joint may be off by ±{kept} at once (proved); of "
         f"{len(plans)} plans that draw as much none was proved to survive more"
     )
     start = plan.trajectory.part(0, 1)
     survived = largest_joint_error(planned, start, none, deadline)
     lost = refuted_joint_error(problem, start, none, survived, deadline)
     if np.isfinite(lost):
-        note += (
-            f"; the start itself does not survive {_thousandths(lost, ceil)} (proved)"
-        )
+        more = quantity(lost, "rad", ceil)
+        note += f"; the start itself does not survive ±{more} (proved)"
     chosen = plans[best]
     return replace(chosen, problem=problem, notes=(*chosen.notes, note), rivals=())
 
@@ -258,26 +257,9 @@ def _worst(verification: ArmVerification) -> str:
     if not failed:
         return "every check passed"
     check = failed[0]
-    worst, limit = (_shown(value, check.unit) for value in (check.worst, check.limit))
+    worst, limit = (quantity(value, check.unit) for value in (check.worst, check.limit))
     where = f" ({check.where})" if check.where else ""
     return f"{check.name}: {check.verdict} with {worst} against {limit}{where}"
-
-
-def _thousandths(error: float, whole: Callable[[float], int]) -> str:
-    """A joint error, rounded so that no more is said than was proved; [rad]."""
-    return f"±{whole(1e3 * np.rad2deg(error)) / 1e3:.3f}°"
-
-
-def _shown(value: float, unit: str) -> str:
-    """The worst value of a check, or its limit, as people read it."""
-    match unit:
-        case "m":
-            return in_mm(value)
-        case "rad":
-            return f"{np.rad2deg(value):.3f}°"
-        case "share":
-            return f"{np.floor(round(1e3 * value, 6)) / 10.0:.1f} %"
-    return f"{value:.6g}" if unit == "-" else f"{value:.6g} {unit}"
 
 
 def _largest(margins: FloatArray) -> float:

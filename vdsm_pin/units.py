@@ -1,8 +1,8 @@
 """Conversion between SI and what people type; for readers and writers only."""
 
-from collections.abc import Mapping
-from math import ceil, floor, isfinite
-from typing import Final
+from collections.abc import Callable, Mapping
+from math import ceil, degrees, floor, isfinite, isinf, isnan, log10
+from typing import Final, TypeAlias
 
 UNITS_PER_METRE: Final[Mapping[str, float]] = {"m": 1.0, "mm": 1e3}
 """Length units a problem file may name.
@@ -12,6 +12,70 @@ Readers divide by these: 206 / 1e3 is the number closest to 0.206, 206 * 1e-3 is
 
 MM_PER_M: Final = 1e3
 """Millimetres in a metre."""
+
+MISSING: Final = "not available"
+"""What stands where there is no evidence; never a pass."""
+
+Whole: TypeAlias = Callable[[float], int]
+"""How a number is rounded to whole ones."""
+
+_NOISE_DIGITS: Final = 6  # of the last digit; what rounding leaves of 5.0 mm is 5.0
+
+_SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
+_LARGE: Final = 1e3  # from here on, a tenth is fine enough
+_SHARE_DIGITS: Final = 9
+_DISPLAY_UNITS: Final[Mapping[str, tuple[float, str]]] = {
+    "m": (MM_PER_M, " mm"),
+    "rad": (degrees(1.0), "°"),
+    "-": (1.0, ""),
+}
+_SHARE: Final = "share"  # the unit of a part of a whole, 0 to 1; people read percent
+
+
+def quantity(value: float | None, unit: str, whole: Whole | None = None) -> str:
+    """A value with its unit as people read it: mm and degrees.
+
+    Args:
+        value: In SI; None or NaN where there is none.
+        unit: "m", "rad", "share" or "-"; any other unit is printed as it is.
+        whole: Rounds to the last digit that is shown; to the nearest where not given.
+
+    Returns:
+        For instance "3.500 mm", "42.500°", "1.2e-10 mm" or "not available".
+    """
+    if value is None or isnan(value):
+        return MISSING
+    if unit == _SHARE:
+        return percent(value)
+    factor, suffix = _DISPLAY_UNITS.get(unit, (1.0, f" {unit}"))
+    shown = value * factor
+    if isinf(shown):
+        return ("+" if shown > 0.0 else "−") + "∞" + suffix
+    if unit == "-" and float(shown).is_integer():
+        return f"{shown:.0f}"
+    fixed = shown == 0.0 or abs(shown) >= _SMALLEST_FIXED
+    digits = 3 if abs(shown) < _LARGE else 1
+    if whole is not None and shown:
+        last = digits if fixed else 1 - floor(log10(abs(shown)))
+        shown = whole(round(shown * 10.0**last, _NOISE_DIGITS)) / 10.0**last
+    text = f"{shown:.{digits}f}" if fixed else f"{shown:.1e}"
+    return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
+
+
+def measured(value: float | None, unit: str) -> str:
+    """The same of a length or an angle of the motion, where rounding noise is zero."""
+    if value is None or isnan(value):
+        return MISSING
+    factor, _ = _DISPLAY_UNITS.get(unit, (1.0, ""))
+    return quantity(value if abs(value) * factor >= _SMALLEST_FIXED else 0.0, unit)
+
+
+def percent(share: float | None) -> str:
+    """A share from 0 to 1 in percent, rounded down: 100 % means nothing is missing."""
+    if share is None or isnan(share):
+        return MISSING
+    whole = round(share, _SHARE_DIGITS)  # rounding noise of a sum is not a gap
+    return f"{floor(whole * 1000.0) / 10.0:.1f} %"
 
 
 def in_mm(length: float) -> str:

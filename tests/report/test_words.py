@@ -7,17 +7,15 @@ import numpy as np
 import pytest
 
 from vdsm_pin.report.words import (
-    MISSING,
     OUTCOMES,
     at_least,
     at_most,
     lost,
     outcome,
-    percent,
     place,
-    quantity,
     survived,
 )
+from vdsm_pin.units import MISSING, percent, quantity
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,10 @@ from itertools import count
 
 from vdsm_pin.batch.task import Done
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.words import at_least, outcome, percent, quantity, term
+from vdsm_pin.report.words import at_least, outcome, term
 from vdsm_pin.text import printable
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import percent, quantity
 
 
 @contextmanager

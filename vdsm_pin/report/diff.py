@@ -18,12 +18,12 @@ from vdsm_pin.report.words import (
     at_least,
     mean_count,
     outcome,
-    percent,
     survived,
     term,
 )
 from vdsm_pin.text import printable
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import percent
 
 Text: TypeAlias = Callable[[float | None], str]
 

@@ -25,7 +25,6 @@ from vdsm_pin.report.rows import Point
 from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.thinning import MOST_DRAWN
 from vdsm_pin.report.words import (
-    MISSING,
     OUTCOMES,
     TIME_LIMIT,
     at_least,
@@ -39,15 +38,12 @@ from vdsm_pin.report.words import (
     limit,
     lost,
     mean_count,
-    measured,
     outcome,
-    percent,
     place,
-    quantity,
     survived,
     term,
 )
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MISSING, MM_PER_M, measured, percent, quantity
 from vdsm_pin.verification.records import ArmVerification, Verification
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"

@@ -13,13 +13,12 @@ from vdsm_pin.report.words import (
     errors,
     lost,
     mean_count,
-    measured,
     outcome,
-    percent,
     survived,
     term,
 )
 from vdsm_pin.text import printable
+from vdsm_pin.units import measured, percent
 
 
 def show_plan(file: PlanFile, folder: Path) -> None:

@@ -1,17 +1,14 @@
 """One vocabulary for terminal, JSON, HTML and JUnit: words, marks, units for people."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Final
 
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MISSING, Whole, quantity
 from vdsm_pin.verification.records import CLEARANCES
-
-MISSING: Final = "not available"
-"""What stands where there is no evidence; never a pass."""
 
 TIME_LIMIT: Final = "time-limit"
 """The outcome of what the time limit ended."""
@@ -20,21 +17,8 @@ if TYPE_CHECKING:
     from vdsm_pin.report.rows import CheckRow, ClosestRow, ErrorBoxRow, MinClearance
     from vdsm_pin.verification.records import Check
 
-Whole: TypeAlias = Callable[[float], int]
-"""How a number is rounded to whole ones."""
-
-_NOISE_DIGITS: Final = 6  # of the last digit; what rounding leaves of 5.0 mm is 5.0
-
-_SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
-_LARGE: Final = 1e3  # from here on, a tenth is fine enough
-_SHARE_DIGITS: Final = 9
 _MOMENT_DIGITS: Final = 2
 _ERROR_DIGITS: Final = 4
-_DISPLAY_UNITS: Final[Mapping[str, tuple[float, str]]] = MappingProxyType(
-    {"m": (MM_PER_M, " mm"), "rad": (math.degrees(1.0), "°"), "-": (1.0, "")}
-)
-_SHARE: Final = "share"  # the unit of a part of a whole, 0 to 1; people read percent
-
 TERMS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "min_clearance_lower_m": "smallest proved clearance",
@@ -125,36 +109,6 @@ _SAME: Final = 10.0 * TOLERANCES.least_bracket
 """Bounds no farther apart are of one depth; [m]."""
 
 
-def quantity(value: float | None, unit: str, whole: Whole | None = None) -> str:
-    """A value with its unit as people read it: mm and degrees.
-
-    Args:
-        value: In SI; None or NaN where there is none.
-        unit: "m", "rad", "share" or "-"; any other unit is printed as it is.
-        whole: Rounds to the last digit that is shown; to the nearest where not given.
-
-    Returns:
-        For instance "3.500 mm", "42.500°", "1.2e-10 mm" or "not available".
-    """
-    if value is None or math.isnan(value):
-        return MISSING
-    if unit == _SHARE:
-        return percent(value)
-    factor, suffix = _DISPLAY_UNITS.get(unit, (1.0, f" {unit}"))
-    shown = value * factor
-    if math.isinf(shown):
-        return ("+" if shown > 0.0 else "−") + "∞" + suffix
-    if unit == "-" and float(shown).is_integer():
-        return f"{shown:.0f}"
-    fixed = shown == 0.0 or abs(shown) >= _SMALLEST_FIXED
-    digits = 3 if abs(shown) < _LARGE else 1
-    if whole is not None and shown:
-        last = digits if fixed else 1 - math.floor(math.log10(abs(shown)))
-        shown = whole(round(shown * 10.0**last, _NOISE_DIGITS)) / 10.0**last
-    text = f"{shown:.{digits}f}" if fixed else f"{shown:.1e}"
-    return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
-
-
 def depth(
     value: float | None, deeper: bool, unit: str = "m", whole: Whole | None = None
 ) -> str:
@@ -204,14 +158,6 @@ def check_cells(row: "CheckRow | Check") -> tuple[str, str]:
     whole = rounding(row)
     asked = limit(row.limit, row.unit, None if row.verdict == "refuted" else whole)
     return depth(row.worst, row.deeper, row.unit, whole), asked
-
-
-def measured(value: float | None, unit: str) -> str:
-    """The same of a length or an angle of the motion, where rounding noise is zero."""
-    if value is None or math.isnan(value):
-        return MISSING
-    factor, _ = _DISPLAY_UNITS.get(unit, (1.0, ""))
-    return quantity(value if abs(value) * factor >= _SMALLEST_FIXED else 0.0, unit)
 
 
 def survived(error: float | None) -> str:
@@ -276,14 +222,6 @@ def counted(count: int, word: str) -> str:
 def limit(value: float | None, unit: str, whole: Whole | None = None) -> str:
     """A check's limit, or that it only reports."""
     return "no limit asked" if value is None else quantity(value, unit, whole)
-
-
-def percent(share: float | None) -> str:
-    """A share from 0 to 1 in percent, rounded down: 100 % means nothing is missing."""
-    if share is None or math.isnan(share):
-        return MISSING
-    whole = round(share, _SHARE_DIGITS)  # rounding noise of a sum is not a gap
-    return f"{math.floor(whole * 1000.0) / 10.0:.1f} %"
 
 
 def term(key: str) -> str:

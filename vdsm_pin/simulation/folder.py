@@ -18,12 +18,13 @@ from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.rows import FileModel, VerdictWord
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.terminal import show_facts
-from vdsm_pin.report.words import at_least, finite, measured, outcome, percent
+from vdsm_pin.report.words import at_least, finite, outcome
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
 from vdsm_pin.simulation.page import BAND_DEG, page
 from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.text import printable
+from vdsm_pin.units import measured, percent
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.inside import located
 from vdsm_pin.verification.judgement import BestEffort, judge_clearance

@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.notebook import Summarised, in_percent
+from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.any_problem import AnyMotion, AnyProblem
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import in_mm, proved_mm
+from vdsm_pin.units import in_mm, percent, proved_mm
 from vdsm_pin.verification.brackets import ClearanceProfile, CoalRows, LeastClearances
 
 
@@ -334,4 +334,4 @@ class ArmVerification(Verification):
     def _drawn(self) -> tuple[tuple[str, str], ...]:
         if self.problem.tip_path is None:
             return ()
-        return (("drawn", in_percent(self.coverage)),)
+        return (("drawn", percent(self.coverage)),)
