@@ -14,7 +14,7 @@ from vdsm_pin import margins
 from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.margins import by_coal, raised_margins
+from vdsm_pin.margins import by_coal, by_link, raised_margins
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
@@ -204,15 +204,14 @@ def test_only_the_link_that_coal_names_gets_a_margin() -> None:
     """A blunder of the planner at one link: the others keep what they had."""
     problem = short("obs3")
     plan = plan_paper(problem, link_clearance(problem), 0.0)
-    margins = np.zeros((8, 1))
-    assert by_coal(plan, margins, NO_LIMIT) == ()
+    assert by_coal(plan, {}, NO_LIMIT) == ()
     tight = replace(problem, required_clearance=0.0037)
-    found = by_coal(replace(plan, problem=tight), margins, NO_LIMIT)
+    found = by_coal(replace(plan, problem=tight), {}, NO_LIMIT)
     links = {one.link for one in found}
     assert links
     assert links < set(range(1, 9))
-    raised = raised_margins(tight, margins, found)
-    assert set(np.flatnonzero(raised[:, 0]) + 1) == links
+    raised = by_link(raised_margins({}, found), 8)
+    assert set(np.flatnonzero(raised) + 1) == links
     for one in found:
         assert one.margin > tight.required_clearance - one.distance > 0.0
 

@@ -1,10 +1,12 @@
 """Margins that links keep from obstacles beyond the required clearance when planning.
 
-A margin of each link and obstacle is raised by what Coal or the proof finds missing.
+A margin of each link and obstacle is raised by what Coal or the proof finds missing. A
+strategy is told the largest of each link alone.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -24,6 +26,11 @@ swings a little farther; [-]."""
 NEAR: Final = 0.5
 """Pairs are measured by Coal up to this part of the body's radius past the required
 clearance; [-]."""
+
+
+Margins: TypeAlias = Mapping[tuple[int, str], float]
+"""What a link, 1 to N, keeps from an obstacle, by its name; 0 where it is not there;
+[m]."""
 
 
 @dataclass(frozen=True)
@@ -97,14 +104,12 @@ def coal_missing(
     return tuple(worst[key] for key in sorted(worst))
 
 
-def by_coal(
-    plan: Plan, margins: FloatArray, deadline: Deadline
-) -> tuple[Adjustment, ...]:
+def by_coal(plan: Plan, margins: Margins, deadline: Deadline) -> tuple[Adjustment, ...]:
     """Raise margins where Coal measures less than required at a waypoint.
 
     Args:
         plan: With the problem whose clearance it has to keep.
-        margins: Those of the plan, shape (N, n_obstacles); [m].
+        margins: Those of the plan.
         deadline: When to give up.
 
     Returns:
@@ -114,75 +119,62 @@ def by_coal(
         OutOfTime: If the time is over.
     """
     problem = plan.problem
-    return tuple(
-        _adjustment(
-            problem, margins, float(one.waypoint), one.link, one.obstacle,
-            ("Coal", one.distance, one.distance),
-        )
-        for one in coal_missing(problem, plan.trajectory, deadline)
-    )  # fmt: skip
+    needed, names = problem.required_clearance, problem.scene.names
+    adjustments = []
+    for one in coal_missing(problem, plan.trajectory, deadline):
+        pair = one.link, names[one.obstacle]
+        margin = _raised(margins, pair, needed - one.distance, one.distance - needed)
+        when = float(one.waypoint)
+        adjustments.append(Adjustment(when, *pair, "Coal", one.distance, margin))
+    return tuple(adjustments)
 
 
-def by_proof(
-    verification: ArmVerification, margins: FloatArray
-) -> tuple[Adjustment, ...]:
+def by_proof(verification: ArmVerification, margins: Margins) -> tuple[Adjustment, ...]:
     """Raise margins where less than required is proved over an interval.
 
     Args:
         verification: Of the plan.
-        margins: Those of the plan, shape (N, n_obstacles); [m].
+        margins: Those of the plan.
 
     Returns:
         One entry for each of the closest approaches to obstacles that is too near.
     """
-    problem = verification.problem
-    names = problem.scene.names
-    return tuple(
-        _adjustment(
-            problem, margins, near.moment, near.pair.link,
-            names.index(near.pair.obstacle), ("proof", near.lower, near.coal),
-        )
-        for near in verification.approaches
-        if near.pair.link  # the feed goes where x0 goes, and nowhere else
-        and near.pair.obstacle
-        and near.lower < problem.required_clearance
-    )  # fmt: skip
+    needed, adjustments = verification.problem.required_clearance, []
+    for near in verification.approaches:
+        pair = near.pair.link, near.pair.obstacle
+        # The feed, link 0, goes where x0 goes, and nowhere else.
+        if all(pair) and near.lower < needed:
+            margin = _raised(margins, pair, needed - near.lower, near.coal - needed)
+            row = Adjustment(near.moment, *pair, "proof", near.lower, margin)
+            adjustments.append(row)
+    return tuple(adjustments)
 
 
-def _adjustment(
-    problem: PlanningProblem,
-    margins: FloatArray,
-    moment: float,
-    link: int,
-    obstacle: int,
-    found: tuple[Literal["Coal", "proof"], float, float],
-) -> Adjustment:
-    """The margin that a link and an obstacle need in the next round.
+def _raised(
+    margins: Margins, pair: tuple[int, str], missing: float, nominal: float
+) -> float:
+    """The margin that a link and an obstacle need in the next round; [m].
 
     Args:
-        problem: With the required clearance.
-        margins: Those of this round, shape (N, n_obstacles); [m].
-        moment: When the clearance is missed, in waypoints.
-        link: 1 to N.
-        obstacle: Number of the obstacle in the scene, from 0.
-        found: Who found it; the clearance under the errors of the problem; and the
-            clearance without errors by Coal, NaN where it was not measured; [m].
+        margins: Those of this round.
+        pair: The link and the obstacle.
+        missing: What they fall short of the required clearance; [m].
+        nominal: What they keep beyond it without errors by Coal, NaN where it was not
+            measured; [m].
     """
-    measured_by, distance, nominal = found
-    missing = problem.required_clearance - distance
-    more = OVERSHOOT * missing + TOLERANCES.planned_clearance
     # What errors take, the plan may have kept already without being asked.
-    kept = np.fmax(margins[link - 1, obstacle], nominal - problem.required_clearance)
-    margin = float(kept) + more
-    name = problem.scene.names[obstacle]
-    return Adjustment(moment, link, name, measured_by, distance, margin)
+    kept = float(np.fmax(margins.get(pair, 0.0), nominal))
+    return kept + (OVERSHOOT * missing + TOLERANCES.planned_clearance)
 
 
-def raised_margins(
-    problem: PlanningProblem, margins: FloatArray, adjustments: tuple[Adjustment, ...]
-) -> FloatArray:
-    """The margins of the next round, shape (N, n_obstacles); [m]."""
-    raised = margins.copy()
-    for one in adjustments:
-        raised[one.link - 1, problem.scene.names.index(one.obstacle)] = one.margin
-    return raised
+def raised_margins(margins: Margins, adjustments: tuple[Adjustment, ...]) -> Margins:
+    """The margins of the next round."""
+    return {**margins, **{(one.link, one.obstacle): one.margin for one in adjustments}}
+
+
+def by_link(margins: Margins, n_links: int) -> FloatArray:
+    """The largest margin of each link from any obstacle, shape (N,); [m]."""
+    largest = np.zeros(n_links)
+    for (link, _), margin in margins.items():
+        largest[link - 1] = max(largest[link - 1], margin)
+    return largest

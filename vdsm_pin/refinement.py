@@ -1,11 +1,11 @@
 """Plan, measure, verify, plan again with larger margins, until the proof goes through.
 
-Coal measures every plan at its waypoints: a link that it finds nearer to an obstacle
-than required gets what is missing as a margin of its own from that obstacle, and the
-plan is made again. Between waypoints the arm swings, and only the verification (proved
-brackets over continuous time) knows by how much; what it finds missing is added in the
-same way. Coal proposes, the bracket proves: a motion with a failed check is never
-handed out as a plan.
+Coal measures every plan at its waypoints: what it finds missing between a link and an
+obstacle is added to their margin, and the plan is made again, by a strategy that is
+told the largest margin of each link. Between waypoints the arm swings, and only the
+verification (proved brackets over continuous time) knows by how much; what it finds
+missing is added in the same way. Coal proposes, the bracket proves: a motion with a
+failed check is never handed out as a plan.
 """
 
 from dataclasses import dataclass, replace
@@ -15,8 +15,14 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
-from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.margins import Adjustment, by_coal, by_proof, raised_margins
+from vdsm_pin.margins import (
+    Adjustment,
+    Margins,
+    by_coal,
+    by_link,
+    by_proof,
+    raised_margins,
+)
 from vdsm_pin.planner.feed import within_feed
 from vdsm_pin.planner.goals import with_ends, with_path
 from vdsm_pin.planner.records import Plan
@@ -139,11 +145,12 @@ def _plan_at_rest(
     check_links_at_start(known.problem, deadline)
     clearance = within_time(link_clearance(known.problem), deadline)
     rounds: list[Round] = []
-    margins = np.zeros((problem.manipulator.n_links, len(problem.scene.obstacles)))
+    margins: Margins = {}
     promised = _promised(problem)
     while True:
         try:
-            found = plan_with(known.problem, clearance, margins.copy())
+            largest = by_link(margins, problem.manipulator.n_links)
+            found = plan_with(known.problem, clearance, largest)
             plan = _chosen(problem, found, deadline)
         except (Infeasible, OutOfTime) as error:
             error.notes = known.notes
@@ -169,7 +176,7 @@ def _plan_at_rest(
             return Refinement(plan, verification, tuple(rounds))
         if not adjustments or len(rounds) == MAX_ROUNDS:
             raise NoPlanFound("; ".join([*known.notes, _story(rounds)]))
-        margins = raised_margins(problem, margins, adjustments)
+        margins = raised_margins(margins, adjustments)
 
 
 def _unread_scheme(plan: Plan) -> tuple[str, ...]:
@@ -227,7 +234,7 @@ def _chosen(problem: PlanningProblem, plan: Plan, deadline: Deadline) -> Plan:
     return replace(chosen, problem=problem, notes=(*chosen.notes, note), rivals=())
 
 
-def _measured(margins: FloatArray, adjustments: tuple[Adjustment, ...]) -> Round:
+def _measured(margins: Margins, adjustments: tuple[Adjustment, ...]) -> Round:
     """A round that Coal ended."""
     worst = min(adjustments, key=lambda one: one.distance)
     reason = (
@@ -238,7 +245,7 @@ def _measured(margins: FloatArray, adjustments: tuple[Adjustment, ...]) -> Round
 
 
 def _proved(
-    margins: FloatArray,
+    margins: Margins,
     verification: ArmVerification,
     adjustments: tuple[Adjustment, ...],
 ) -> Round:
@@ -262,8 +269,8 @@ def _worst(verification: ArmVerification) -> str:
     return f"{check.name}: {check.verdict} with {worst} against {limit}{where}"
 
 
-def _largest(margins: FloatArray) -> float:
-    return float(margins.max(initial=0.0))
+def _largest(margins: Margins) -> float:
+    return max(margins.values(), default=0.0)
 
 
 def _story(rounds: list[Round]) -> str:

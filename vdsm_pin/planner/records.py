@@ -101,8 +101,8 @@ class Plan(Summarised):
 
 
 Margin: TypeAlias = float | FloatArray
-"""What a plan keeps beyond the required clearance: one number, or one for each link and
-obstacle, shape (N, n_obstacles); [m]."""
+"""What a plan keeps beyond the required clearance: one number, or one for each link,
+shape (N,); [m]."""
 
 
 class LinkClearance(Protocol):

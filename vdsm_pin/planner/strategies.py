@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 Strategy: TypeAlias = "Callable[[PlanningProblem, LinkClearance, Margin], Plan]"
 """(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond
-the required clearance [m]; the refinement raises it where verification asks for it."""
+the required clearance, of each link [m]; the refinement raises it where verification
+asks for it."""
 
 STRATEGIES: Final[Mapping[str, str]] = MappingProxyType(
     {

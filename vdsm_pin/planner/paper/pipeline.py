@@ -48,7 +48,8 @@ def plan_paper(
     _check_straight(problem)
     check_feasibility(problem.manipulator, problem.path)
     check_start(problem, clearance)
-    motion = _best_motion(problem, clearance, _by_link(problem, margin))
+    margins = np.full(problem.manipulator.n_links, margin)
+    motion = _best_motion(problem, clearance, margins)
     return Plan(
         problem,
         "paper",
@@ -62,13 +63,6 @@ def plan_paper(
         motion.route.notes,
         steps=motion,
     )
-
-
-def _by_link(problem: PlanningProblem, margin: Margin) -> FloatArray:
-    """The largest margin of each link from any obstacle, shape (N,); [m]."""
-    shape = problem.manipulator.n_links, max(1, len(problem.scene.obstacles))
-    given = np.zeros(shape) if np.size(margin) == 0 else np.broadcast_to(margin, shape)
-    return np.array(given.max(axis=1))
 
 
 def _check_straight(problem: PlanningProblem) -> None:
