@@ -73,8 +73,8 @@ def robot(lengths: list[float], joints: int | None = None) -> Any:
 def test_a_chain_is_an_arm_of_the_shifts_between_its_joints(
     lengths: list[float],
 ) -> None:
-    found = _Reading(HERE, robot(lengths)).arm(b"content")
-    assert (found.content, found.name) == (b"content", "arm")
+    found = _Reading(HERE, robot(lengths)).arm()
+    assert found.name == "arm"
     assert found.link_lengths.tolist() == lengths
     assert found.link_radius == 0.1 + len(lengths) - 1
     assert found.max_joint_angle == 0.5
@@ -136,10 +136,10 @@ def test_what_is_no_such_arm_is_named(change: Any, said: str | None) -> None:
     arm = robot([1.0, 2.0, 3.0] if change is turned else [1.0, 2.0])
     change(arm)
     if said is None:
-        assert _Reading(HERE, arm).arm(b"").link_lengths.tolist() == [1.0, 2.0]
+        assert _Reading(HERE, arm).arm().link_lengths.tolist() == [1.0, 2.0]
         return
     with pytest.raises(InvalidFile, match=said):
-        _Reading(HERE, arm).arm(b"")
+        _Reading(HERE, arm).arm()
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_what_is_no_such_arm_is_named(change: Any, said: str | None) -> None:
 def test_an_arm_has_two_joints_for_each_of_two_links(joints: int, said: str) -> None:
     arm = robot([1.0, 2.0, 3.0], joints)
     with pytest.raises(InvalidFile, match=said):
-        _Reading(HERE, arm).arm(b"")
+        _Reading(HERE, arm).arm()
 
 
 def test_shapes_lie_on_the_axis_of_their_link() -> None:

@@ -135,8 +135,7 @@ class ArmBuilder(Builder):
 
     def _from_urdf(self, model: schema.UrdfManipulatorModel) -> Manipulator:
         """The arm of a URDF; its bytes belong to the problem as those of meshes do."""
-        found = read_urdf_arm(self.reading.folder / model.urdf)
-        self.reading.digest.update(found.content)
+        found = self.reading.read(model.urdf, read_urdf_arm)
         low, high = found.base_range
         self._check_extent(float(found.link_lengths.sum()), max(-low, high))
         unit = UNITS_PER_METRE[self.frame.unit]

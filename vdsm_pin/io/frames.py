@@ -7,11 +7,11 @@ A `Builder` of a part of a problem file has the `Reading` of it.
 """
 
 import math
-from collections.abc import Sequence, Sized
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence, Sized
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
+
+T = TypeVar("T")
 
 PRECISION: Final = 256
 """Bits in which a mesh far from its own origin is turned about it.
@@ -141,13 +143,20 @@ class Reading:
         document: The file, for messages.
         frame: Its unit and base.
         folder: Where relative paths start.
-        digest: Gets the bytes of the files that it names, in their order.
+        digest: Gets the bytes of the files that it names, in the order of `files`.
+        files: Those that it names, in the order in which they are read.
     """
 
     document: YamlDocument
     frame: Frame
     folder: Path
     digest: Digest
+    files: list[Path] = field(default_factory=list)
+
+    def read(self, name: str, reader: Callable[[Path, Digest], T]) -> T:
+        """What a reader makes of a file that is named, whose bytes it hands on."""
+        self.files.append(self.folder / name)
+        return reader(self.files[-1], self.digest)
 
     def in_own_frame(self) -> "Reading":
         """The file as bodies are read that have a frame of their own."""

@@ -276,7 +276,7 @@ class ObstacleBuilder(Builder):
     ) -> T:
         """The content of an obstacle's own file."""
         try:
-            return reader(self.reading.folder / model.file, self.reading.digest)
+            return self.reading.read(model.file, reader)
         except InvalidFile as error:
             at = (*at, "file")
             raise self.document.invalid_file(at, model.file, error) from None

@@ -18,9 +18,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.io.arm_builder import ArmBuilder
-from vdsm_pin.io.arm_schema import ManipulatorModel, UrdfManipulatorModel
 from vdsm_pin.io.frames import Builder
-from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.problem_schema import OtherModel, RobotModel
 from vdsm_pin.io.source import check_is_file_or_bag, read_bytes
@@ -136,7 +134,8 @@ class OtherReader(Builder):
         if model.topic is not None:
             problem = f"is {model.topic!r}, but trajectories of snake arms are no bags"
             raise self.document.invalid((*at, "topic"), problem)
-        reading = replace(self.reading, digest=sha256())  # `build_problem` takes them
+        # What it reads is handed on with the trajectory: `build_problem` hashes it.
+        reading = replace(self.reading, digest=sha256(), files=[])
         arm = ArmBuilder(reading, (*at, "manipulator")).build(model.manipulator)
         try:
             content = read_bytes(file, limit=MAX_BYTES)
@@ -145,10 +144,9 @@ class OtherReader(Builder):
             )
         except InvalidFile as error:
             raise self.document.invalid_file(where, model.trajectory, error) from None
-        own = (folder / name for name in files_of_arm(model.manipulator))
         bodies = tuple(_bodies(model.name, arm, motion, pose))
         timed = motion.times is not None
-        return Others(bodies, (*own, file), timed, {file: content})
+        return Others(bodies, (*reading.files, file), timed, {file: content})
 
 
 def _bodies(
@@ -162,11 +160,3 @@ def _bodies(
     for link, solid in (*arm.rods, *arm.carried):
         named = replace(solid, name=f"{name}: {solid.name}")
         yield Moving(named, carrier, link_frame(link))
-
-
-def files_of_arm(model: str | ManipulatorModel | UrdfManipulatorModel) -> list[str]:
-    """The URDF of an arm, or the meshes that its links carry."""
-    if isinstance(model, UrdfManipulatorModel):
-        return [model.urdf]
-    bodies = [] if isinstance(model, str) else model.bodies
-    return [one.file for one in bodies if isinstance(one, FromFileModel)]

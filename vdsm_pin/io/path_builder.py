@@ -182,7 +182,7 @@ class PathBuilder(PostureBuilder):
         if isinstance(part, list):
             return np.array([part])
         if isinstance(part, FilePart):
-            return read_points(self.reading.folder / part.file, self.reading.digest)
+            return self.reading.read(part.file, read_points)
         if before is None:
             message = "has no point before it, expected one where it begins"
             raise InvalidInput(message)

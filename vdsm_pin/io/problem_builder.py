@@ -33,16 +33,16 @@ def build_problem(
     reading: Reading,
     *,
     name: str,
-    read_others: Callable[[], Others],
+    read_others: Callable[[Sequence[schema.OtherModel]], Others],
 ) -> PlanningProblem:
     """The planning problem that a file describes.
 
     Args:
         model: The file's content, each value checked by itself.
-        reading: The file. Its digest gets the bytes of the files that are named, in
-            the order of the calls below, which is that of `ProblemSource.files`: the
-            arm's URDF or the meshes that links carry, those of the obstacles, the
-            files of other arms and robots, those of the path.
+        reading: The file. What it names is read, and goes to the hash, in the order of
+            the calls below, which certificates hold to: the arm's URDF or the meshes
+            that links carry, those of the obstacles, the files of other arms and
+            robots, those of the path.
         name: Name of the problem where the file gives none.
         read_others: Reads the other arms and robots.
 
@@ -57,12 +57,13 @@ def build_problem(
     arm = collector.attempt(_arm, model, reading)
     obstacles = ObstacleBuilder(reading, arm.total_length if arm else None)
     rest = collector.attempt(obstacles.build_scene, model.obstacles, arm)
-    others = collector.attempt(read_others)
+    others = collector.attempt(read_others, model.others)
     scene = None
     if rest is not None and others is not None:
         for file in others.files:
             read = others.contents.get(file)
             digest.update(read_bytes(file, limit=MAX_BYTES) if read is None else read)
+        reading.files.extend(others.files)
         scene = collector.attempt(joined, rest, others.bodies, document)
     collector.attempt(_check_ends, model, document)
     tip_tolerance = collector.attempt(_tip_tolerance, model, frame, document)

@@ -1,7 +1,7 @@
 """Problem files by path or built-in name: the only reader of the YAML contract."""
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -9,9 +9,7 @@ from typing import Any, Final, NamedTuple
 from vdsm_pin.errors import InvalidFile, UnknownName
 from vdsm_pin.io.frames import Reading
 from vdsm_pin.io.motion_field import MovableModel
-from vdsm_pin.io.obstacle_schema import FromFileModel
-from vdsm_pin.io.others import OtherReader, Others, ReadRobot, files_of_arm
-from vdsm_pin.io.path_schema import FilePart
+from vdsm_pin.io.others import OtherReader, ReadRobot
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import checked
 from vdsm_pin.io.problem_schema import ProblemModel
@@ -96,31 +94,13 @@ def arm_problem(
         raise document.invalid(("robot",), what)
     model = checked(document, ProblemModel)
     stem = "".join(c if c.isalnum() else "_" for c in path.stem[:100])
-    digest, folder, of_others = hashlib.sha256(content), path.parent, list[Path]()
-    reading = Reading(document, model.frame, folder, digest)
-
-    def read_others() -> Others:
-        found = OtherReader(reading, read_robot).read(model.others)
-        of_others.extend(found.files)
-        return found
-
-    problem = build_problem(model, reading, name=stem, read_others=read_others)
-    named = tuple(_files_named(model, folder, of_others))
+    reading = Reading(document, model.frame, path.parent, hashlib.sha256(content))
+    others = OtherReader(reading, read_robot)
+    problem = build_problem(model, reading, name=stem, read_others=others.read)
     of_obstacles = files_of_obstacles(model.obstacles, path.parent)
-    source = ProblemSource(path, digest.hexdigest(), named, of_obstacles)
+    named, sha256 = tuple(reading.files), reading.digest.hexdigest()
+    source = ProblemSource(path, sha256, named, of_obstacles)
     return problem.read_from(source)
-
-
-def _files_named(
-    model: ProblemModel, folder: Path, of_others: Sequence[Path]
-) -> Iterator[Path]:
-    """All files that a problem names, in the order in which the hash takes them."""
-    obstacles, path = model.obstacles, model.tip_path
-    files = [one.file for one in obstacles if isinstance(one, FromFileModel)]
-    yield from (folder / name for name in (*files_of_arm(model.manipulator), *files))
-    yield from of_others
-    parts = path.points if path else []
-    yield from (folder / part.file for part in parts if isinstance(part, FilePart))
 
 
 def files_of_obstacles(

@@ -17,7 +17,7 @@ import numpy as np
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.source import decode, naming_file, read_bytes
+from vdsm_pin.io.source import Digest, decode, naming_file, read_bytes
 from vdsm_pin.io.xml_reader import declared
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -55,7 +55,6 @@ class UrdfArm:
     """What a URDF says of an arm.
 
     Args:
-        content: The bytes of the file.
         name: Of the robot.
         link_lengths: L_1..L_N, shape (N,); [m].
         link_radius: Largest radius of its spheres and cylinders; [m].
@@ -63,7 +62,6 @@ class UrdfArm:
         base_range: Smallest and largest x0; [m].
     """
 
-    content: bytes
     name: str
     link_lengths: FloatArray
     link_radius: float
@@ -71,13 +69,18 @@ class UrdfArm:
     base_range: tuple[float, float]
 
 
-def read_urdf_arm(path: Path) -> UrdfArm:
+def read_urdf_arm(path: Path, digest: Digest) -> UrdfArm:
     """The arm that a URDF describes.
+
+    Args:
+        path: The URDF.
+        digest: Gets its bytes.
 
     Raises:
         InvalidFile: If the file is no URDF, or not of such an arm; names the joint.
     """
     content = read_bytes(path, limit=MAX_BYTES)
+    digest.update(content)
     with naming_file(path):
         document = validate_urdf(declared(decode(content, path)))
     from yourdfpy import URDF  # slow to import, and only such files need it
@@ -88,7 +91,7 @@ def read_urdf_arm(path: Path) -> UrdfArm:
         load_meshes=False,
         load_collision_meshes=False,
     ).robot
-    return _Reading(path, robot).arm(content)
+    return _Reading(path, robot).arm()
 
 
 def _bare(element: ET.Element) -> ET.Element:
@@ -113,7 +116,7 @@ class _Reading:
     path: Path
     robot: Any
 
-    def arm(self, content: bytes) -> UrdfArm:
+    def arm(self) -> UrdfArm:
         """The chain of joints as lengths and limits."""
         joints = self._chain()
         rail, turning, end = joints[0], joints[1:-1], joints[-1]
@@ -135,7 +138,6 @@ class _Reading:
         lengths = [*offsets[2:-1:2], offsets[-1]]
         links = (joint.child for joint in turning[1::2])
         return UrdfArm(
-            content,
             self.robot.name or self.path.stem,
             np.array(lengths),
             self._radius(dict(zip(links, lengths, strict=True))),
