@@ -125,6 +125,16 @@ def _as_it_is(module: str) -> Change:
     return Change(module, 0, "", "", "", content)
 
 
+def _task(change: Change, seen: CoverageMap, budget: float) -> Task:
+    """Whom to ask about a change: nobody, where it is within a function never run."""
+    places = effects(change, list(seen.tests))
+    within = change.function and not change.names
+    if within and not seen.meets(places):
+        return Task(change, {}, budget)
+    known = seen.runs(places) or not change.line
+    return Task(change, seen.asked(places), budget * (1 if known else WIDER))
+
+
 def tried(
     group: Group, chosen: list[Change], asked: argparse.Namespace
 ) -> Iterator[Trial]:
@@ -132,15 +142,8 @@ def tried(
     maps = maps_of(group, asked.tests or list(group.tests), chosen, asked)
     for plain, seen in maps.items():
         mine = [one for one in chosen if group.runs_plain(one.module) is plain]
-        tasks = [
-            Task(
-                one,
-                seen.asked(places),
-                asked.budget * (1 if seen.runs(places) or not one.line else WIDER),
-            )
-            for one in [*[_as_it_is(mine[0].module)] * asked.jobs, *mine]
-            for places in [effects(one, list(seen.tests))]
-        ]
+        every = [*[_as_it_is(mine[0].module)] * asked.jobs, *mine]
+        tasks = [_task(one, seen, asked.budget) for one in every]
         for trial in tried_at_once(tasks, PLAIN if plain else None, asked.jobs):
             if trial.change.line:
                 yield trial

@@ -48,6 +48,11 @@ class CoverageMap:
         """Whether some test runs one of the lines of some modules."""
         return bool(self._of(places))
 
+    def meets(self, places: dict[str, tuple[int, ...]]) -> bool:
+        """Whether a test, one that is not asked or an import runs one of the lines."""
+        return any(line in self.tests.get(module, {}) for module, lines in
+                   places.items() for line in lines)  # fmt: skip
+
     def asked(self, places: dict[str, tuple[int, ...]]) -> dict[str, float]:
         """Tests of lines of some modules with their seconds.
 

@@ -212,6 +212,21 @@ def test_each_file_of_tests_is_asked_before_any_twice() -> None:
     assert Task(change, tests, 0.01).asked() == ["a::1"]
 
 
+def test_nobody_is_asked_about_a_line_within_a_function_that_nothing_runs() -> None:
+    """What an import or a slow test runs stands in the map without a test."""
+    module = "vdsm_pin/errors.py"
+    seen = CoverageMap({module: {1: ["a::1"], 2: []}}, {"a::1": 0.1, "a::2": 0.2})
+
+    def asked(line: int, function: str, *names: str) -> list[str]:
+        change = Change(module, line, function, "", "", "", (line,), names)
+        return [*program._task(change, seen, 3.0).tests]
+
+    assert asked(1, "one") == ["a::1"]
+    assert asked(2, "one") == ["a::1", "a::2"]
+    assert asked(3, "one") == []
+    assert asked(3, "") == asked(3, "One", "One") == ["a::1", "a::2"]
+
+
 TRIED = """
 import sys
 from pathlib import Path
