@@ -525,6 +525,19 @@ def test_damaged_files_never_end_in_a_traceback(tmp_path: Path, robot: Robot) ->
     assert refused > 200
 
 
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("none.yaml", r"none\.yaml: does not exist"),
+        (".", "is a folder, expected a file"),
+        ("paper/obs1", "paper/obs1: does not exist"),  # an arm's, by its name
+    ],
+)
+def test_a_cell_is_read_from_a_path(name: str, told: str) -> None:
+    with pytest.raises(InvalidFile, match=rf"^{told}$|\.: {told}$"):
+        read_cell(name)
+
+
 def run(*arguments: object) -> int:
     with pytest.raises(SystemExit) as ended:
         main([str(argument) for argument in arguments])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 from vdsm_pin.app.arm_subject import ArmSubject
 from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions
 from vdsm_pin.app.problems import read_robot
-from vdsm_pin.io.problem_file import arm_problem, read_document
+from vdsm_pin.io.problem_file import arm_problem, find_problem, read_document
 from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.records import Verification
@@ -124,7 +124,7 @@ def read_problem_or_cell(name_or_path: str | Path) -> ProblemOrCell:
     Raises:
         InvalidFile: If the file or one that it names breaks its contract.
     """
-    file = read_document(name_or_path)
+    file = read_document(find_problem(name_or_path))
     if not file.is_of_robot:
         return arm_problem(file, read_robot)
     from vdsm_pin.robots.cell import cell_of_file

@@ -22,7 +22,7 @@ from vdsm_pin.certificate_checker.balls import Rejected, claim
 from vdsm_pin.certificate_checker.claims import Clearances
 from vdsm_pin.certificate_checker.robot import Robot, other_robot
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.problem_file import arm_problem, read_document
+from vdsm_pin.io.problem_file import arm_problem, find_problem, read_document
 from vdsm_pin.io.source import bounded_lines, check_is_file_or_bag, check_unchanged
 from vdsm_pin.robots.files import cell_file
 from vdsm_pin.text import printable, show_everything
@@ -103,7 +103,7 @@ class _Run:
         self, lines: Iterator[dict[str, Any]], problem: Path, trajectory: Path
     ) -> tuple[str, list[str]]:
         """What is judged, and what was assumed."""
-        file = read_document(problem)
+        file = read_document(find_problem(problem))
         robot = file.is_of_robot
         stated: Any = cell_file(file) if robot else arm_problem(file, other_robot)
         header = next(lines, {})

@@ -44,13 +44,12 @@ class ProblemDocument(NamedTuple):
         return isinstance(self.yaml.data, dict) and "robot" in self.yaml.data
 
 
-def read_document(name_or_path: str | Path) -> ProblemDocument:
-    """The file of a built-in name or a path as YAML.
+def read_document(path: Path) -> ProblemDocument:
+    """A problem file as YAML.
 
     Raises:
         InvalidFile: If it cannot be read, or is no YAML.
     """
-    path = find_problem(name_or_path)
     content = read_bytes(path, limit=MAX_PROBLEM_BYTES)
     text = decode(content, path)
     if text.lstrip().startswith(("<?xml", "<robot", "<!--")):
@@ -74,7 +73,7 @@ def read_problem(
     Raises:
         InvalidFile: If the file or its content breaks the contract of docs/files.md.
     """
-    return arm_problem(read_document(name_or_path), read_robot)
+    return arm_problem(read_document(find_problem(name_or_path)), read_robot)
 
 
 def arm_problem(

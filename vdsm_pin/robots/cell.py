@@ -12,6 +12,7 @@ from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.problem_file import read_document
+from vdsm_pin.io.source import check_is_file, path_of
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
@@ -233,7 +234,9 @@ def read_cell(path: str | Path) -> Cell:
     Raises:
         InvalidFile: If the file or one that it names breaks its contract.
     """
-    return cell_of_file(cell_file(read_document(path)))
+    file = path_of(path)
+    check_is_file(file)
+    return cell_of_file(cell_file(read_document(file)))
 
 
 def cell_of_file(file: CellFile) -> Cell:
