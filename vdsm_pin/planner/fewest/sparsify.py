@@ -17,8 +17,10 @@ from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, is_directed, standing
 from vdsm_pin.tolerances import TOLERANCES
 
-ROUNDS: Final = 3
+ROUNDS: Final = 4
 """Rounds over all joints."""
+WAYS: Final = (-1, 1, 0)
+"""How a joint is made straight, in this order, see `in_line`."""
 
 
 def sparser(judge: Judge, corners: Corners) -> Corners:
@@ -33,13 +35,12 @@ def sparser(judge: Judge, corners: Corners) -> Corners:
     """
     corners = projected(judge, corners)
     joints = range(1, judge.problem.manipulator.n_links)
-    for ways in ((0,), (1, -1, 0)):
-        for _ in range(ROUNDS):
-            before = corners
-            for joint, way in itertools.product(joints, ways):
-                corners = _without(judge, corners, joint, way)
-            if corners is before:
-                break
+    for _ in range(ROUNDS):
+        before = corners
+        for joint, way in itertools.product(joints, WAYS):
+            corners = _without(judge, corners, joint, way)
+        if corners is before:
+            break
     return corners
 
 
