@@ -6,7 +6,7 @@ A false `certified` is a pair proved clear that is not; a false `refuted` the re
 `undecided` far from the limit (1 um or more) must stay below 0.1 %. Exit 0 if all hold.
 
 Each query goes to the compiled sweep as the one pair it asks about. One scene in a
-hundred also goes through `prove_clearance` as a whole, broad phase included, which must
+hundred also goes through `prove_motion` as a whole, broad phase included, which must
 not contradict the truth either. Queries about error boxes are certified falsely where a
 motion within the box is known, or found, to come too near; they are far from the limit
 where a known plane proves the whole box with 1 um to spare. The same seed gives the
@@ -66,8 +66,9 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import new_proving
 from vdsm_pin.proof.terms import WORLD
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.clearance import prove_motion
 
 FAR: Final = 1e-6
 """From here on a query must be decided; [m]."""
@@ -187,7 +188,7 @@ def _far(hull: Hull) -> float:
 
 
 def whole(batch: Batch) -> tuple[Any, Any]:
-    """Some queries and the verdicts of `prove_clearance` on them."""
+    """Some queries and the verdicts of `prove_motion` on them."""
     arm, asked = batch.arm, np.arange(min(batch.size, WHOLE))
     bodies, clearance, between = [], float(batch.required[0]), 0.0
     if batch.groups:
@@ -211,7 +212,8 @@ def whole(batch: Batch) -> tuple[Any, Any]:
     q, blank = batch.rows, np.zeros(len(batch.rows))
     rows = Trajectory(blank > 0.0, blank, q[:, 0], q[:, 1::2], q[:, 2::2])
     chunks: list[ClearanceChunk] = []
-    prove_clearance(problem, rows, ErrorBox(), [chunks.append])
+    motion = AskedMotion.of_arm(problem, rows, ErrorBox())
+    prove_motion(motion, Budget(), [chunks.append])
     return asked, chunks[0].verdict[0, columns]
 
 
@@ -440,7 +442,7 @@ def report(tally: Counter[str], command: str) -> str:
         f"* `undecided`: {tally['undecided']:,}; of the {tally['far']:,} at least 1 um "
         f"from the limit {tally['undecided far']:,} ({share:.5%}, allowed 0.1 %)",
         f"* truth recomputed in ball arithmetic for {tally['rechecked']:,}; "
-        f"{tally['scenes judged whole']:,} scenes judged through `prove_clearance` too",
+        f"{tally['scenes judged whole']:,} scenes judged through `prove_motion` too",
         f"* {tally['certified boxes attacked']:,} queries certified for an error box, "
         "each attacked from corners of it",
         f"* {versions}, Python {platform.python_version()}, {platform.machine()}",

@@ -40,8 +40,10 @@ from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.clearance import prove_clearance, prove_motion
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.records import Pair, Verdict
 from vdsm_pin.verification.task import arm_assembly
@@ -169,9 +171,8 @@ def test_coal_agrees_with_every_bracket_of_every_solid(seed: int) -> None:
     problem, rows = problem_with(arm, *around), rows_of(rng, 0.4)
     box = ErrorBox(joint=float(rng.choice([0.0, 0.01])), base=0.003, base_turn=0.004)
     chunks: list[ClearanceChunk] = []
-    proof = prove_clearance(
-        problem, rows, box if seed % 2 else ErrorBox(), [chunks.append]
-    )
+    motion = AskedMotion.of_arm(problem, rows, box if seed % 2 else ErrorBox())
+    proof = prove_motion(motion, Budget(), [chunks.append])
     lower, looked = chunks[0].lower, 0
     for _ in range(40):
         k, share = int(rng.integers(len(lower))), rng.uniform()

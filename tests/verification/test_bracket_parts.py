@@ -20,6 +20,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import (
     CLAIM,
     FIRST,
@@ -39,6 +40,7 @@ from vdsm_pin.verification import (
     coal_check,
     counterexample,
 )
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import (
     ClearanceChunk,
     ClearanceProfile,
@@ -48,6 +50,7 @@ from vdsm_pin.verification.clearance import (
     _merged,
     _steps,
     prove_clearance,
+    prove_motion,
 )
 from vdsm_pin.verification.clearance_check import (
     Evidence,
@@ -660,7 +663,8 @@ def test_sinks_hear_of_every_interval_once(monkeypatch: pytest.MonkeyPatch) -> N
         still, chunks = np.zeros((rows, 8)), list[ClearanceChunk]()
         rest = np.zeros(rows)
         motion = Trajectory(rest > 0, rest, np.linspace(0, 0.1, rows), still, still)
-        proof = prove_clearance(asked, motion, ErrorBox(), (chunks.append,))
+        whole = AskedMotion.of_arm(asked, motion, ErrorBox())
+        proof = prove_motion(whole, Budget(), (chunks.append,))
         monkeypatch.setattr(clearance, "CHUNK", 7)
         assert max(len(chunk.lower) for chunk in chunks) == min(most, max(1, rows - 1))
         assert proof.sent == proof.motion.n_trajectory_intervals == max(1, rows - 1)

@@ -14,10 +14,11 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.report.facts import min_clearance
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
 from vdsm_pin.verification.inside import check_inside, located_at_start
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
@@ -72,7 +73,8 @@ def prove(
     problem: PlanningProblem, rows: Trajectory, errors: ErrorBox = NOMINAL
 ) -> tuple[ClearanceProof, list[ClearanceChunk]]:
     chunks: list[ClearanceChunk] = []
-    return prove_clearance(problem, rows, errors, [chunks.append]), chunks
+    motion = AskedMotion.of_arm(problem, rows, errors)
+    return prove_motion(motion, Budget(), [chunks.append]), chunks
 
 
 @pytest.mark.parametrize("seed", range(4))

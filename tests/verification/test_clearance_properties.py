@@ -25,9 +25,11 @@ from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.clearance import prove_clearance, prove_motion
 from vdsm_pin.verification.coal_shapes import Sides, assembly_shapes
 from vdsm_pin.verification.pinocchio_arm import PinocchioArm, load_arm
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
@@ -132,7 +134,8 @@ def halved(q: FloatArray, n: int) -> FloatArray:
 
 def brackets(problem: PlanningProblem, rows: Trajectory) -> ClearanceChunk:
     chunks: list[ClearanceChunk] = []
-    prove_clearance(problem, rows, ErrorBox(), [chunks.append])
+    motion = AskedMotion.of_arm(problem, rows, ErrorBox())
+    prove_motion(motion, Budget(), [chunks.append])
     (chunk,) = chunks
     return chunk
 

@@ -17,11 +17,13 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_arm, coal_check, robust
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.clearance import prove_clearance, prove_motion
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 
@@ -142,8 +144,9 @@ def test_sinks_hear_of_near_obstacles_what_they_hear_of_all() -> None:
     problem, motion = cloud(1), swaying()
     everything: list[ClearanceChunk] = []
     near: list[ClearanceChunk] = []
-    proof = prove_clearance(problem, motion, ErrorBox(), [everything.append])
-    prove_clearance(problem, motion, ErrorBox(), [near.append], reach=REACH)
+    asked = AskedMotion.of_arm(problem, motion, ErrorBox())
+    proof = prove_motion(asked, Budget(), [everything.append])
+    prove_motion(asked, Budget(), [near.append], REACH)
     pairs, all_lower = near[0].pairs, everything[0].lower
     assert pairs is not None
     assert 21 < pairs.size < all_lower.shape[1]

@@ -16,11 +16,12 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import RENEWED
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.clearance import prove_clearance, prove_motion
 
 ARM = built_in("hrm8")
 N = ARM.n_links
@@ -72,7 +73,8 @@ def clearances(mesh: Mesh, rows: Trajectory, at: FloatArray) -> FloatArray:
 def test_what_is_held_from_row_to_row_stays_below_the_distance(box: ErrorBox) -> None:
     mesh, rows = tunnel(0.55), swaying(150)
     chunks: list[ClearanceChunk] = []
-    proof = prove_clearance(problem_of(mesh), rows, box, [chunks.append])
+    motion = AskedMotion.of_arm(problem_of(mesh), rows, box)
+    proof = prove_motion(motion, Budget(), [chunks.append])
     assert proof.counts.sum() == proof.counts[:, 0].sum()
     lower = np.concatenate([chunk.lower for chunk in chunks])[:, :N]
     at = np.sort(np.random.default_rng(1).uniform(0.0, rows.n_samples - 1, 100))

@@ -23,13 +23,15 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
-from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.clearance import prove_clearance, prove_motion
 from vdsm_pin.verification.judgement import guarded
 from vdsm_pin.verification.pointing import check_pointing
 from vdsm_pin.verification.records import Check, Verdict, Verification
@@ -113,9 +115,8 @@ def test_a_limit_at_any_moment_claims_no_more_than_was_proved() -> None:
     for share in np.arange(100) / 50.0:
         chunks: list[ClearanceChunk] = []
         deadline = Deadline.after(float(share) * spent)
-        found = prove_clearance(
-            problem, rows, ErrorBox(), [chunks.append], deadline=deadline
-        )
+        motion = AskedMotion.of_arm(problem, rows, ErrorBox())
+        found = prove_motion(motion, Budget(until=deadline.end), [chunks.append])
         assert (found.counts.sum(axis=1) == rows.n_samples - 1).all()
         assert (found.counts[:, 0] <= whole.counts[:, 0]).all()
         assert (found.counts[:, 1] <= whole.counts[:, 1]).all()

@@ -163,26 +163,11 @@ def prove_clearance(
     problem: PlanningProblem,
     trajectory: Trajectory,
     errors: ErrorBox,
-    sinks: Sequence[ClearanceSink] = (),
     deadline: Deadline = NO_LIMIT,
-    reach: float = math.inf,
 ) -> ClearanceProof:
-    """Bracket the clearance of every pair over every interval.
-
-    Args:
-        problem: Arm, scene, required clearances.
-        trajectory: The motion; one row counts as an interval without motion.
-        errors: The proof covers every motion within this box.
-        sinks: Receive the brackets in chunks, in order, once all is proved.
-        deadline: What is not judged by then is undecided.
-        reach: Obstacles that no link is proved nearer to than this, at any time, are
-            left out of what the sinks receive; [m].
-
-    Returns:
-        The proof, its least brackets narrowed unless the time ended before.
-    """
+    """`prove_motion` of a snake arm, of every motion within the errors."""
     motion = AskedMotion.of_arm(problem, trajectory, errors)
-    return prove_motion(motion, Budget(until=deadline.end), sinks, reach)
+    return prove_motion(motion, Budget(until=deadline.end))
 
 
 def prove_motion(
@@ -191,7 +176,18 @@ def prove_motion(
     sinks: Sequence[ClearanceSink] = (),
     reach: float = math.inf,
 ) -> ClearanceProof:
-    """`prove_clearance` of what is asked already."""
+    """Bracket the clearance of every pair over every interval.
+
+    Args:
+        motion: What is asked.
+        budget: What is not judged within it is undecided.
+        sinks: Receive the brackets in chunks, in order, once all is proved.
+        reach: Obstacles that no link is proved nearer to than this, at any time, are
+            left out of what the sinks receive; [m].
+
+    Returns:
+        The proof, its least brackets narrowed unless the time ended before.
+    """
     asked, proving = motion.asked, motion.proving(budget)
     step("proving the clearance of %d pairs", motion.question.n_pairs)
     with watched(lambda: proving.share):

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import nan
-from typing import Final, ParamSpec, TypeVar
+from typing import Final, TypeVar, TypeVarTuple
 
 import numpy as np
 
@@ -56,7 +56,7 @@ from vdsm_pin.verification.records import (
 LOG: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
-P = ParamSpec("P")
+A = TypeVarTuple("A")
 
 
 class BestEffort:
@@ -69,14 +69,7 @@ class BestEffort:
     def __init__(self) -> None:
         self.not_done: list[str] = []
 
-    def take(
-        self,
-        name: str,
-        otherwise: T,
-        run: Callable[P, T],
-        *args: P.args,
-        **kw: P.kwargs,
-    ) -> T:
+    def take(self, name: str, otherwise: T, run: Callable[[*A], T], *args: *A) -> T:
         """What `run` returns, or `otherwise` and a note if it raises `OutOfTime`.
 
         Args:
@@ -84,11 +77,10 @@ class BestEffort:
             otherwise: What stands for the result if the time is over.
             run: Works it out.
             args: What it is given.
-            kw: The same by name.
         """
         step("%s", name)
         try:
-            return run(*args, **kw)
+            return run(*args)
         except OutOfTime as error:
             self.not_done.append(f"{name}: {error}")
             return otherwise
@@ -99,15 +91,12 @@ class BestEffort:
 
 
 def guarded(
-    name: str,
-    run: Callable[P, Check | tuple[Check, ...]],
-    *args: P.args,
-    **kw: P.kwargs,
+    name: str, run: Callable[[*A], Check | tuple[Check, ...]], *args: *A
 ) -> tuple[Check, ...]:
     """A check's rows; one undecided row if it raises a domain or arithmetic error."""
     step("%s", name)
     try:
-        rows = run(*args, **kw)
+        rows = run(*args)
     except (VdsmError, ArithmeticError) as error:
         if not isinstance(error, VdsmError):
             LOG.exception("%s failed", name)
@@ -185,8 +174,8 @@ def judge_clearance(
         contacts: Whether to look for when bodies first and last come too close.
     """
     asked, nominal = proof.motion.asked, proof.motion.under(NO_ERRORS)
-    name = "search for counterexamples"
-    found = extras.take(name, (), proof.counterexamples, deadline)
+    name, search = "search for counterexamples", proof.counterexamples
+    found: tuple[Counterexample, ...] = extras.take(name, (), search, deadline)
     clear = bool(found) and extras.take(NOMINAL, False, _is_clear, nominal, deadline)
     about = problem, trajectory, proof.motion, proof.on_path, deadline
     met: tuple[FirstContact, ...] = ()
