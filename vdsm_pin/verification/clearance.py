@@ -214,16 +214,12 @@ def _send(
     Returns:
         Number of intervals sent.
     """
-    asked, known, obstacles = (
-        motion.asked,
-        proving.results,
-        motion.asked.scene.obstacles,
-    )
+    asked, known = motion.asked, proving.results
     outer, obstacle = asked.outer, asked.table.one - len(asked.own)
     # numpy.unique imports numpy.ma, for which every process would wait.
     near = np.flatnonzero(np.bincount(obstacle[outer & (known.best[:, LOW] <= reach)]))
     pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)
-    if near.size < len(obstacles):
+    if near.size < len(asked.scene.obstacles):
         motion = motion.among(pairs)
         proving = motion.proving(proving.budget)
     length = CHUNK_VALUES // max(1, pairs.size) // BLOCK * BLOCK

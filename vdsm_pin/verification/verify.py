@@ -20,11 +20,7 @@ from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.clearance import ClearanceProof, prove_motion
 from vdsm_pin.verification.coal_arm import coal_reach
-from vdsm_pin.verification.coal_check import (
-    LowersSink,
-    ProvedLowers,
-    ask_coal,
-)
+from vdsm_pin.verification.coal_check import LowersSink, ProvedLowers, ask_coal
 from vdsm_pin.verification.enclosed import EnclosedSink, pairs_inside
 from vdsm_pin.verification.inside import (
     Places,
