@@ -78,6 +78,12 @@ def percent(share: float | None) -> str:
     return f"{floor(whole * 1000.0) / 10.0:.1f} %"
 
 
+def percent_at_most(share: float) -> str:
+    """The same rounded up: 0 % means that there is nothing."""
+    whole = round(share, _SHARE_DIGITS)
+    return f"{ceil(whole * 1000.0) / 10.0:.1f} %"
+
+
 def in_mm(length: float) -> str:
     """A length as people read it, in messages and notes; [m] to mm."""
     if not isfinite(length):

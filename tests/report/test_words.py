@@ -15,7 +15,7 @@ from vdsm_pin.report.words import (
     place,
     survived,
 )
-from vdsm_pin.units import MISSING, percent, quantity
+from vdsm_pin.units import MISSING, percent, percent_at_most, quantity
 
 
 @pytest.mark.parametrize(
@@ -57,6 +57,11 @@ def test_quantities_read_as_people_write_them(
 )
 def test_percent_never_rounds_up_to_complete(share: float | None, text: str) -> None:
     assert percent(share) == text
+
+
+def test_a_share_of_what_is_bad_never_rounds_down_to_nothing() -> None:
+    told = [percent_at_most(share) for share in (0.0, 1e-15, 4e-5, 0.125, 0.1251)]
+    assert told == ["0.0 %", "0.0 %", "0.1 %", "12.5 %", "12.6 %"]
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,14 @@ from vdsm_pin.report.words import (
     survived,
     term,
 )
-from vdsm_pin.units import MISSING, MM_PER_M, measured, percent, quantity
+from vdsm_pin.units import (
+    MISSING,
+    MM_PER_M,
+    measured,
+    percent,
+    percent_at_most,
+    quantity,
+)
 from vdsm_pin.verification.records import ArmVerification, Verification
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -84,6 +91,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     filters = [quantity, depth, at_least, at_most, check_cells, limit, percent,
+               percent_at_most,
                errors, outcome, mean_count, measured, survived,
                lost, kept_at_least, counted, term, place, assumption, point, css_text,
                scene_words, sentence]  # fmt: skip

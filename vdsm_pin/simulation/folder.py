@@ -1,5 +1,6 @@
 """One simulation from files to a result folder."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -24,7 +25,7 @@ from vdsm_pin.simulation.page import BAND_DEG, page
 from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.text import printable
-from vdsm_pin.units import measured, percent
+from vdsm_pin.units import measured, percent, percent_at_most
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.inside import located
 from vdsm_pin.verification.judgement import BestEffort, judge_clearance
@@ -231,9 +232,9 @@ def show_simulation(file: SimulationFile, folder: Path) -> None:
         ("largest base error", measured(file.largest_base_error_m, "m")),
         ("any motion within these errors", file.within_error_box.verdict),
         ("joints within ±0.3°", percent(file.within_band_share)),
-        ("largest tension", f"{file.largest_tension_n:.0f} N"),
-        ("slack", f"{percent(file.slack_share)} of all cables and times"),
-        ("least joint stiffness", f"{file.least_stiffness_nm_rad:.1f} Nm/rad"),
-        ("tension margin", f"{file.least_tension_margin_n:.0f} N in every cable"),
+        ("largest tension", f"{math.ceil(file.largest_tension_n)} N"),
+        ("slack", f"{percent_at_most(file.slack_share)} of all cables and times"),
+        ("least joint stiffness", f"{math.floor(file.least_stiffness_nm_rad)} Nm/rad"),
+        ("tension margin", f"{math.floor(file.least_tension_margin_n)} N a cable"),
         ("files in", str(folder)),
     )
