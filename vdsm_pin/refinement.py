@@ -50,10 +50,8 @@ from vdsm_pin.verification.verify import verify
 MAX_ROUNDS: Final = 8
 """Rounds before giving up."""
 
-
 HANDED_OUT: Final = (Verdict.CERTIFIED, Verdict.INCOMPLETE)
 """Verdicts of motions that are clear and within their limits at every instant."""
-
 
 UNPROVED: Final = "a motion was found, but not proved"
 

@@ -121,9 +121,7 @@ def _first(row: Check, contact: FirstContact) -> Check:
     if contact.intervals:
         last = _told(contact.last, contact.last_time, ceil)
         runs = "" if contact.stretches == 1 else f" in {contact.stretches} stretches"
-        many = (
-            "1 interval" if contact.intervals == 1 else f"{contact.intervals} intervals"
-        )
+        many = f"{contact.intervals} interval{'s' if contact.intervals > 1 else ''}"
         where += f"; last at waypoint {last}; {many}{runs}"
     return replace(
         row,
