@@ -8,11 +8,10 @@ from vdsm_pin.cli.ending import INTERRUPTED, fail
 from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
-    AsJson,
+    Answer,
     ErrorOptions,
     OutFolder,
     PlanningTime,
-    Quiet,
     SlideErrors,
     Strategy,
     examples,
@@ -76,8 +75,7 @@ def batch(
     pdf: Annotated[
         bool, typer.Option("--pdf", help="Print each report to its folder too.")
     ] = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    answer: Answer,
 ) -> None:
     """Plan and verify many problems.
 
@@ -113,7 +111,7 @@ def batch(
         settings=settings,
         jobs=jobs,
         scheduler=scheduler,
-        quiet=quiet or as_json,
+        quiet=answer.wordless,
         trajectories=tuple(trajectories or ()),
     )
     for folder in passed_over(asked.problems):
@@ -124,8 +122,8 @@ def batch(
     except Interrupted as error:
         fail(error, INTERRUPTED)
     passed = sum(outcome(row.outcome).passed for row in rows)
-    if as_json:
+    if answer.as_json:
         typer.echo(json.dumps([row.model_dump() for row in rows], indent=2))
-    elif not quiet:
+    elif not answer.quiet:
         typer.echo(f"{passed} of {len(rows)} certified; see {out / 'index.html'}")
     raise typer.Exit(PASSED if passed == len(rows) else NOT_PASSED)

@@ -113,17 +113,15 @@ class RobotOptions(NamedTuple):
         )
 
     def files(self) -> "RobotFiles":
-        """Those of the robot.
+        """Those of the robot; there is a URDF.
 
         Raises:
-            InvalidInput: If there is no URDF.
+            InvalidInput: If a value makes no sense.
         """
         from vdsm_pin.robots.cell import locks
         from vdsm_pin.robots.files import RobotFiles, solids_of
 
-        if self.urdf is None:
-            message = "expected a PROBLEM, or --urdf for a robot"
-            raise InvalidInput(message)
+        assert self.urdf is not None
         return RobotFiles(
             self.urdf,
             self.srdf,
