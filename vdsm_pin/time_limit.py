@@ -80,11 +80,11 @@ GRACE: Final = 0.5
 """Work that has heard of the end has so long to write down what it found; [s]."""
 
 AGAIN: Final = 1.0
-"""What took an interruption for a failure of its own is interrupted again; [s]."""
+"""Interval of the alarm, which repeats as a library may swallow the first; [s]."""
 
 
 SOON: Final = 0.02
-"""While a library is imported the end is told again so much later; [s]."""
+"""When the alarm is tried again while an import is under way; [s]."""
 
 
 def _imports(frame: FrameType | None, caller: FrameType) -> bool:

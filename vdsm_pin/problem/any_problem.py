@@ -63,7 +63,7 @@ class AnyProblem(Summarised):
     source: ProblemSource | None
 
     def check_errors(self, errors: ErrorBox) -> None:
-        """Refuse errors of what there is not.
+        """Refuse errors of joints or obstacles that do not exist.
 
         Raises:
             InvalidInput: If they are.
@@ -110,7 +110,7 @@ class AnyProblem(Summarised):
             errors: The copy has the least box that holds these and its own.
 
         Raises:
-            InvalidInput: If they are of what there is not.
+            InvalidInput: If they name what does not exist.
         """
         self.check_errors(errors)
         widened = self.errors.widened(errors)

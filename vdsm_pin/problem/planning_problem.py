@@ -128,7 +128,7 @@ class PlanningProblem(AnyProblem, ByValue):
             raise InvalidInput(message)
 
     def check_errors(self, errors: ErrorBox) -> None:
-        """Refuse errors of what there is not.
+        """Refuse errors of obstacles or joints that do not exist.
 
         Raises:
             UnknownName: If they name an obstacle that is not in the scene.
@@ -176,7 +176,7 @@ class PlanningProblem(AnyProblem, ByValue):
 
     @property
     def slides(self) -> bool:
-        """Whether the base does, along the rail."""
+        """Whether the base can move along the rail."""
         low, high = self.manipulator.base_range
         return low < high
 
