@@ -150,7 +150,7 @@ def test_a_command_that_hangs_in_reading_ends_with_one_word(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for module in (problem_file, subjects):
-        monkeypatch.setattr(module, "read_problem", for_ever)
+        monkeypatch.setattr(module, "read_document", for_ever)
     words = [command, "paper/obs1", "--out", str(tmp_path / "out")]
     rows = [] if command == "plan" else ["--trajectory", str(tmp_path / "none.csv")]
     found = CliRunner().invoke(app, [*words, *rows, "--time-limit", "0.1"])

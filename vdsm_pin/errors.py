@@ -39,18 +39,21 @@ class VdsmError(Exception):
     """Base of all errors raised on purpose; as text one line that can be shown.
 
     Attributes:
+        heading: What begins the text.
         notes: What was found of the problem, told before the message.
-        history: What was tried before, told after the message.
+        more: What else is known of the work that failed, told after the message.
         page: A page that was written and tells more.
     """
 
+    heading: str = ""
     notes: tuple[str, ...] = ()
-    history: tuple[str, ...] = ()
+    more: tuple[str, ...] = ()
     page: Path | None = None
 
     def __str__(self) -> str:
         """All of it, which may quote a file: every sign of it can be seen."""
-        return printable("; ".join([*self.notes, super().__str__(), *self.history]))
+        parts = *self.notes, super().__str__(), *self.more
+        return printable(self.heading + "; ".join(parts))
 
 
 class InvalidInput(VdsmError):

@@ -152,7 +152,7 @@ def _plan_at_rest(
             plan = _chosen(problem, found, deadline)
         except (Infeasible, OutOfTime) as error:
             error.notes = known.notes
-            error.history = (f"before that {_story(rounds)}",) if rounds else ()
+            error.more = (f"before that {_story(rounds)}",) if rounds else ()
             raise
         adjustments = by_coal(plan, margins, deadline)
         if adjustments:

@@ -104,7 +104,7 @@ def test_a_cloud_is_planned_certified_rechecked_and_lies_are_told(
     proof = tmp_path / "proof.certificate"
     order = VerifyOrder(problem, rows, tmp_path / "v", "verify", certificate=proof)
     verified = verify_to_folder(order)
-    assert verified.file.verdict == "certified"
+    assert verified.content.verdict == "certified"
     arguments = [str(proof), str(problem.files[0]), str(rows)]
     assert check_certificate(arguments) == 0, capsys.readouterr()
     # The same certificate about a scan that comes 100 mm nearer proves nothing.

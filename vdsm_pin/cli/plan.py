@@ -6,7 +6,6 @@ from contextlib import contextmanager, nullcontext
 
 import typer
 
-from vdsm_pin.cli.ending import fail
 from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
@@ -78,7 +77,7 @@ def plan(
 def _planning(limit: float | None) -> Iterator[Deadline]:
     """Plan within a limit; None for the default, longer where code is yet to be made.
 
-    Where there is no plan, the command ends and says so.
+    Where there is no plan, the error says what was spent on it.
     """
     from vdsm_pin.kept import default_limit, is_cold, note_planned
 
@@ -86,15 +85,14 @@ def _planning(limit: float | None) -> Iterator[Deadline]:
     try:
         yield Deadline.after(default_limit() if limit is None else limit)
     except (Infeasible, OutOfTime) as error:
-        said = [str(error)]
         if isinstance(error, OutOfTime | NoPlanFound):
-            said = [f"no plan found: {error}"]
+            error.heading = "no plan found: "
         if isinstance(error, OutOfTime) and compiles:
-            said.append("compiling took part of it, the next plan is quicker")
+            error.more += ("compiling took part of it, the next plan is quicker",)
             note_planned()
         if isinstance(error, NoPlanFound):
-            said.append(f"searched for {time.monotonic() - begin:.1f} s")
+            error.more += (f"searched for {time.monotonic() - begin:.1f} s",)
             note_planned()
         if error.page:
-            said.append(f"see {error.page}")
-        fail(Infeasible("; ".join(said)), NOT_PASSED)
+            error.more += (f"see {error.page}",)
+        raise
