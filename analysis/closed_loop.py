@@ -7,11 +7,11 @@ and alpha6. What is assumed stands in `vdsm_pin/simulation/settings.py`; nothing
 fitted.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 from closed_loop_figures import actual_and_planned, errors, poses
 from paper_figures import style
 from result_files import output_folder, table_lines, write_table
@@ -23,7 +23,7 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.simulation.closed_loop import Simulation, simulate
 from vdsm_pin.simulation.folder import Cleared, SimulationFile, summary
 from vdsm_pin.simulation.settings import Kick, Settings
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import percent, proved_mm, quantity
 
 SCENES = ("free", "obs1", "obs2", "obs2-small", "obs3")
 STRATEGIES = ("paper", "fewest", "sturdiest")
@@ -82,12 +82,12 @@ def row(scene: str, strategy: str, file: SimulationFile) -> dict[str, str]:
         "strategy": strategy,
         "planned": _clearance(file.planned),
         "executed": _clearance(file.executed),
-        "largest error [deg]": f"{np.rad2deg(file.largest_error_rad):.2f}",
-        "within 0.3 deg": f"{100 * file.within_band_share:.1f} %",
+        "largest error": quantity(file.largest_error_rad, "rad", math.ceil),
+        "within 0.3 deg": percent(file.within_band_share),
         "any motion within that error": _clearance(file.within_error_box),
-        "tension [N]": f"{file.largest_tension_n:.0f}",
-        "least stiffness [Nm/rad]": f"{file.least_stiffness_nm_rad:.0f}",
-        "tension margin [N]": f"{file.least_tension_margin_n:.0f}",
+        "tension [N]": f"{math.ceil(file.largest_tension_n)}",
+        "least stiffness [Nm/rad]": f"{math.floor(file.least_stiffness_nm_rad)}",
+        "tension margin [N]": f"{math.floor(file.least_tension_margin_n)}",
     }
 
 
@@ -111,7 +111,7 @@ def sweep() -> list[dict[str, str]]:
 def _clearance(found: Cleared) -> str:
     if found.min_clearance_m is None:
         return f"{found.verdict}, no obstacle"
-    return f"{found.verdict}, {found.min_clearance_m * MM_PER_M:.2f} mm"
+    return f"{found.verdict}, {proved_mm(found.min_clearance_m)}"
 
 
 def markdown(rows: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
@@ -121,7 +121,8 @@ def markdown(rows: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
              "motion within that error\": the largest error of any joint at any step "
              "of the controller fed to the proof as the error of every joint, and that "
              "of x0 as the base's. Clearances are proved lower bounds: an undecided "
-             "one may be larger.", ""]  # fmt: skip
+             "one may be larger. What is simulated is rounded to the worse side.",
+             ""]  # fmt: skip
     planned, changed = (
         table_lines(list(some[0]), [one.values() for one in some])
         for some in (rows, swept)
