@@ -389,6 +389,14 @@ def test_what_is_not_stated_of_errors_is_none(tmp_path: Path) -> None:
         assert read_problem(tmp_path / "p.yaml").errors == expected
 
 
+@pytest.mark.parametrize("stated", [{"slide": 5}, {"joint_deg": {"elbow": 0.5}}])
+def test_errors_that_other_robots_have_are_refused(
+    tmp_path: Path, stated: dict[str, object]
+) -> None:
+    said = "joints of a snake arm are numbered and slide by the base alone"
+    assert said in refused_text(tmp_path, edited(OBS1, ("errors",), stated))
+
+
 @pytest.mark.parametrize("count", [0, 7, 9])
 def test_errors_of_joints_are_as_many_as_joints(tmp_path: Path, count: int) -> None:
     text = edited(OBS1, ("errors",), {"joint_deg": [0.1] * count})

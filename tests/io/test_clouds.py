@@ -397,7 +397,7 @@ BAD = {
             )
         )
     },
-    "zip.npy": (b"PK\x03\x04" + bytes(40), "is no array of numbers"),
+    "zip.npy": (b"PK\x03\x04" + bytes(40), "is no array of numbers: it is no NPY file"),
     "q.ply": (FILES["j.ply"].replace(b"float z", b"float w"), "has no x, y, z"),
     "r.pcd": (pcd("ascii", b"", 0), "has no point"),
     "s.pcd": (pcd("ascii", lines(np.hstack([POINTS, POINTS]))), "line 12: has 6 val"),

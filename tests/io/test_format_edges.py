@@ -213,6 +213,15 @@ def test_faces_of_dae_with_too_few_corners_are_left_out(
     assert len(mesh.triangles) == count
 
 
+@pytest.mark.parametrize("counts", ["-1 4", "4 -1", "3 1", "2"])
+def test_faces_of_dae_have_as_many_corners_as_are_counted(
+    counts: str, tmp_path: Path
+) -> None:
+    root = f"<polylist>{INPUT}<vcount>{counts}</vcount><p>0 1 2</p></polylist>"
+    with pytest.raises(InvalidFile, match="names vertices that are not there, or is"):
+        read_mesh(write(tmp_path, "a.dae", dae(HERE, root=root)))
+
+
 @pytest.mark.parametrize("stride", [1, 2, 5, 64])
 def test_corners_of_dae_have_as_many_numbers_as_inputs(
     stride: int, tmp_path: Path

@@ -82,6 +82,12 @@ LIMITS: dict[str, tuple[ModuleType, str, int, Reader, Made]] = {
     "dae": (raw, "MAX_TRIANGLES", 8, *meshes("a.dae", dae(HERE + HERE))),
     "obj": (raw, "MAX_TRIANGLES", 12, *meshes("a.obj", BOX.export(file_type="obj"))),
     "stl": (raw, "MAX_TRIANGLES", 12, *meshes("a.stl", BOX.export(file_type="stl"))),
+    "stl text": (
+        raw,
+        "MAX_TRIANGLES",
+        12,
+        *meshes("a.stl", BOX.export(file_type="stl_ascii").encode()),
+    ),
     "text": (
         raw, "MAX_CORNERS", 36, *meshes("a.stl", BOX.export(file_type="stl_ascii"))
     ),
