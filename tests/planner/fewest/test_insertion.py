@@ -1,6 +1,7 @@
 """Ways in through openings: of the tip, of the arm that follows, of the motion."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ from vdsm_pin.planner.fewest.follow_the_leader import (
     own_curve,
     way_back,
 )
-from vdsm_pin.planner.fewest.growth import Layers, Population
+from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
@@ -543,6 +544,36 @@ def test_an_arm_that_gets_in_farther_on_draws_from_where_it_did_not(
     steps = np.linalg.norm(np.diff(found.corners.tips, axis=0), axis=1)
     assert steps[drawn].sum() == pytest.approx(0.2)
     np.testing.assert_allclose(found.corners.tips[:-1][drawn][0], points[0])
+
+
+@pytest.mark.parametrize("turn", [0.7, 2.0])
+def test_arms_that_lean_backwards_are_inserted_by_directions_at_once(
+    turn: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Along an arc by less and by more than a quarter turn."""
+    grown = list[Population]()
+    grow = Population.grow
+
+    def counted(self: Population, *given: Any) -> Grown:
+        grown.append(self)
+        return grow(self, *given)
+
+    monkeypatch.setattr(Population, "grow", counted)
+    angle, radius = np.linspace(0.0, turn, 40), 0.7
+    arc = np.stack([np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle], axis=1)
+    way = np.array(START) + radius * arc
+    path = DesiredPath(way[0], way[-3:], closed=False, insertion=way[1:-3])
+    arm = replace(equal_links(12), base_range=(-9.0, 5.0))
+    task = replace(problem(points=way[-3:], start=START, closed=False), tip_path=path)
+    task = replace(task, manipulator=arm)
+    rows = path_rows(task.path)
+    closed = np.zeros(len(rows.tips), dtype=np.bool_)
+    effort = Insert(population=2, routes=1, backtracks=0, seed=0)
+    insert(judge_of(task), space_of(task), rows, closed, effort)
+    assert bool(grown) == (turn < np.pi / 2.0)
+    directed = replace(effort, directed=True)
+    insert(judge_of(task), space_of(task), rows, closed, directed)
+    assert grown
 
 
 @pytest.mark.parametrize("count", [3, 8])

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.fewest.follow_the_leader import way_back
+from vdsm_pin.planner.fewest.follow_the_leader import led_along, way_back
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
@@ -123,6 +123,7 @@ class _Search:
         self.outside = space.begun_at(self.back[-1])
         self.rng = np.random.default_rng(effort.seed)
         self.farthest: _Visit | None = None
+        self.leans_back = False
 
     def found(self, soon: Deadline) -> Found | None:
         """Visits until the path's end is reached or too many are in vain."""
@@ -132,7 +133,8 @@ class _Search:
         # Where a part of the path is no answer, nobody need look for one.
         most = 1 if self.judge.problem.path.blocked is Blocked.FAIL else FAILURES
         while k < last:
-            if self.route.closed[k + 1] or failures == most or (visits and soon.passed):
+            over = failures == most or self.leans_back or (visits and soon.passed)
+            if self.route.closed[k + 1] or over:
                 k += 1
                 skipped.append(k)
                 begin = k
@@ -167,6 +169,9 @@ class _Search:
         best: _Visit | None = None
         path = self._path(k)
         for route in self._routes(path):
+            if best is None and self._leans_back(route):
+                self.leans_back = True
+                return None
             visit = self._grown(k, route)
             if self.farthest is None or visit.come > self.farthest.come:
                 self.farthest = visit
@@ -183,6 +188,17 @@ class _Search:
                 reached = int(visit.chain.layer[-1])
                 self.space.avoid(route[min(reached + 1, visit.before)])
         return best
+
+    def _leans_back(self, route: FloatArray) -> bool:
+        """Whether links that follow a way in lean backwards: no projections say so.
+
+        An insertion by directions comes next, which takes the same ways.
+        """
+        if self.effort.directed:
+            return False
+        arm = self.judge.problem.manipulator
+        laid = led_along(route, start_centres(self.judge.problem), arm.link_lengths)
+        return bool((np.diff(laid[:, :, 0], axis=1) <= 0.0).any())
 
     def _back_to(self, visit: _Visit, first: int) -> _Visit | None:
         """A visit that draws as far, and from an earlier layer, come to by the later.
