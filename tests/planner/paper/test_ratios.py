@@ -28,7 +28,7 @@ ARM = FREE.manipulator
 
 def planned(scaling: Scaling | None, problem: PlanningProblem = FREE) -> Plan:
     asked = replace(problem, scaling=scaling)
-    return plan_paper(asked, link_clearance(asked), np.zeros(0))
+    return plan_paper(asked, link_clearance(asked), 0.0)
 
 
 @pytest.mark.parametrize("axis", ["y", "z"])
