@@ -178,7 +178,7 @@ def whole(problem: PlanningProblem) -> list[dict[str, object]]:
         found.setdefault(kind, [])
         own = replace(problem, scaling=scaling)
         try:
-            plan = plan_paper(own, link_clearance(own), np.zeros(0))
+            plan = plan_paper(own, link_clearance(own), 0.0)
         except Infeasible:
             continue
         if len(plan.undrawn):
