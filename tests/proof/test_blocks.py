@@ -282,7 +282,7 @@ def test_a_box_holds_the_corners_and_no_more(seed: int) -> None:
         work = new_workspace(task, case.tree.n_columns, 1)
         fill_rows(task, case.path.packed(), work.rows, 0, INTERVALS)
         low, high = np.zeros((2, 3))
-        body_box(task, work.rows, INTERVALS, 0, low, high)
+        size = body_box(task, work.rows, (0, INTERVALS), 0, low, high)
         least, most = np.full(3, np.inf), np.full(3, -np.inf)
         for place in mover.slots.tolist():
             number, lever = task.places.way[place], task.places.lever[place]
@@ -296,21 +296,22 @@ def test_a_box_holds_the_corners_and_no_more(seed: int) -> None:
             least = np.minimum(least, seen(case, place).min(axis=0) - grown)
             most = np.maximum(most, seen(case, place).max(axis=0) + grown)
         np.testing.assert_allclose([low, high], [least, most], **EXACT)
+        assert size == pytest.approx((most - least).sum(), rel=1e-12)
 
 
 def test_boxes_are_as_far_apart_as_their_nearest_points() -> None:
     rng, n = np.random.default_rng(2), 200
     box = np.sort(rng.uniform(-1.0, 1.0, (2, 3, n)), axis=0)
     low, high = np.sort(rng.uniform(-1.0, 1.0, (2, 3)), axis=0)
-    point, far = rng.uniform(-1.0, 1.0, (3, n)), rng.random(n) < 0.5
+    point = rng.uniform(-1.0, 1.0, (3, n))
     gap, reach = np.zeros((2, n))
     box_gaps(box, low, high, gap)
-    box_reaches(point, low, high, 0.1, far, reach)
+    box_reaches(point, low, high, 0.1, reach)
     apart = np.maximum(box[0] - high[:, None], low[:, None] - box[1])
     np.testing.assert_allclose(gap, np.linalg.norm(apart.clip(0.0), axis=0), **EXACT)
     corners = np.stack(np.meshgrid(*np.stack([low, high]).T)).reshape(3, 8, 1)
     away = np.linalg.norm(corners - point[:, None], axis=0).max(axis=0)
-    np.testing.assert_allclose(reach, np.where(far, away + 0.1, np.inf), **EXACT)
+    np.testing.assert_allclose(reach, away + 0.1, **EXACT)
 
 
 def test_errors_of_axes_that_meet_are_a_sum_of_vectors() -> None:

@@ -86,6 +86,26 @@ def moved(case: Case, body: int, row: int) -> FloatArray:
     return np.asarray(piece.points @ pose[:3, :3].T + pose[:3, 3])
 
 
+def boxes_of(
+    case: Case, work: Any, count: int, pair: int
+) -> list[tuple[int, FloatArray, FloatArray]]:
+    """The boxes that a body is looked at by: the first interval of each, low, high."""
+    low, high = np.zeros((2, 3))
+
+    def size(first: int, last: int) -> float:
+        span = first, min(last, count)
+        return float(body_box(case.task, work.rows, span, pair, low, high))
+
+    length = count
+    while length > 1 and size(0, length) > broad_phase.SPREAD * size(0, 1):
+        length //= 2
+    found = []
+    for first in range(0, count, length):
+        size(first, first + length)
+        found.append((first, low.copy(), high.copy()))
+    return found
+
+
 @pytest.mark.parametrize("nominal", [True, False])
 @pytest.mark.parametrize("seed", range(6))
 def test_far_pairs_are_told_as_by_loops(seed: int, nominal: bool) -> None:
@@ -119,27 +139,33 @@ def test_far_pairs_are_told_as_by_loops(seed: int, nominal: bool) -> None:
         limit, near = results.limit[ACROSS], [1]
         stretch = Stretch(start, start, count, False, False, False)
         n_near = settle_far(task, work, results, broad, stretch)
-        bounds = np.full((2, 2, n), np.inf)
+        bounds, when = np.full((2, 2, n), np.inf), np.zeros((2, 2, n))
         for b in range(2):
-            of, low, high = n + b, np.zeros(3), np.zeros(3)
-            asked = number[b] >= 0
-            body_box(task, work.rows, count, int(number[b][asked][0]), low, high)
+            of, asked = n + b, number[b] >= 0
+            some = int(number[b][asked][0])
             radius = case.bodies[of].pieces[0].radius
             lost = np.where(asked, task.pairs.lost[number[b]], 0.0)
-            apart = np.maximum(broad.box[0].T - high, low - broad.box[1].T).clip(0.0)
-            gap = np.linalg.norm(apart, axis=1) - lost
+            gaps, reaches, rows = [], [], []
+            for first, low, high in boxes_of(case, work, count, some):
+                apart = np.maximum(broad.box[0].T - high, low - broad.box[1].T)
+                gaps.append(np.linalg.norm(apart.clip(0.0), axis=1) - lost)
+                corner = np.maximum(centres - low, high - centres)
+                reaches.append(np.linalg.norm(corner, axis=1) + PAD - radius)
+                rows.append(start + first)
+            gap, reach = np.min(gaps, axis=0), np.min(reaches, axis=0)
+            at = np.array(rows)[np.argmin([gaps, reaches], axis=1)]
             nearest = int(np.argmin(np.where(asked, gap, np.inf)))
-            pose = case.tree.poses(case.path.knots[start : start + 1])
+            row = int(at[0, nearest])
+            pose = case.tree.poses(case.path.knots[row : row + 1])
             two = case.bodies[of], case.bodies[nearest]
             upper = float(clearances(case.tree, two, pose)[0]) + PAD
             limit = min(limit, upper) if nominal else limit
             required = np.array([pairs[max(k, 0)].required for k in number[b]])
             far = asked & (gap >= np.maximum(max(upper, limit), required))
             near += number[b][asked & ~far].tolist()
-            corner = np.maximum(centres - low, high - centres)
-            reach = np.linalg.norm(corner, axis=1) + PAD - radius
             settled[b] += count * far
             bounds[:, b] = np.where(far, [gap, reach], np.inf)
+            when[:, b] = at
             for o in np.flatnonzero(far).tolist():
                 pair = number[b, o]
                 for k in range(start, start + count):
@@ -166,7 +192,7 @@ def test_far_pairs_are_told_as_by_loops(seed: int, nominal: bool) -> None:
         np.testing.assert_allclose(broad.gap[:2], bounds[0], **CLOSE)
         np.testing.assert_allclose(broad.reach[:2], bounds[1], **CLOSE)
         assert sorted(broad.near[:n_near].tolist()) == sorted(near)
-        since = np.where(bounds < least - 1e-9, start, since)
+        since = np.where(bounds < least - 1e-9, when, since)
         least = np.minimum(least, bounds)
         bins = sorted({k // 3 for k in range(start, start + count)})
         for side in range(2):

@@ -66,7 +66,7 @@ def test_bounds_are_raised_to_what_is_proved_of_all_intervals(
 def test_the_clearance_of_a_cylinder_and_what_is_nearest_is_bounded_from_above(
     seed: int,
 ) -> None:
-    """At the first row of a block, to what brackets are worked out to."""
+    """At the row of the nearest box, to what brackets are worked out to."""
     rng = np.random.default_rng([5, seed])
     arm = random_tree(rng, 3)
     middle = 5.0 * unit(rng)
@@ -80,9 +80,9 @@ def test_the_clearance_of_a_cylinder_and_what_is_nearest_is_bounded_from_above(
     work, broad = new_workspace(task, arm.n_columns, 4, 8), new_broad_phase(task, 1)
     for start in (0, 3):
         fill_rows(task, path.packed(), work.rows, start, 2)
-        broad.gap[:] = 1.0
-        upper = nearest_upper(task, work, broad, 0)
-        (pose,) = arm.poses(path.knots[start : start + 1])[:, arm.n_frames - 1]
+        broad.gap[:], broad.when[1], row = 1.0, start + 1, start + 1
+        upper = nearest_upper(task, work, broad, 0, start)
+        (pose,) = arm.poses(path.knots[row : row + 1])[:, arm.n_frames - 1]
         seen = pose[:3, :3].T @ (middle - pose[:3, 3]) - can.centre
         along = abs(float(seen @ can.axis))
         across = float(np.linalg.norm(np.cross(seen, can.axis)))

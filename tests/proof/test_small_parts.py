@@ -475,9 +475,9 @@ def test_values_below_a_bar_are_seen_wherever_they_stand() -> None:
 
 def test_the_first_least_values_and_their_intervals_are_kept() -> None:
     least, at = np.array([1.0, np.inf, 2.0]), np.array([5, 6, 7])
-    keep_least(np.array([0.5, 3.0, 2.0]), least, at, 9)
+    keep_least(np.array([0.5, 3.0, 2.0]), np.array([8, 9, 10]), least, at)
     assert least.tolist() == [0.5, 3.0, 2.0]
-    assert at.tolist() == [9, 9, 7]
+    assert at.tolist() == [8, 9, 7]
 
 
 def test_the_least_upper_bound_is_kept_with_the_nearer_row() -> None:

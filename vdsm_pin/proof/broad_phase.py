@@ -1,4 +1,4 @@
-"""The broad phase: boxes over a block of intervals settle the pairs that are far.
+"""The broad phase: boxes over some intervals settle the pairs that are far.
 
 A pair is far where the distance of the boxes exceeds the required clearance, the
 least clearance met so far, and the distance of the body's nearest obstacle: then no
@@ -24,24 +24,31 @@ from vdsm_pin.proof.workspace import Workspace, load_rows
 FEW: Final = 8
 """Up to so many obstacles nothing is culled and every bracket is narrow."""
 
+SPREAD: Final = 1.5
+"""A box over several intervals may be larger than one of an interval by this; [-]."""
+
 
 @compiled
-def _nearest_upper(task: Task, work: Workspace, broad: BroadPhase, body: int) -> float:
+def _nearest_upper(
+    task: Task, work: Workspace, broad: BroadPhase, body: int, start: int
+) -> float:
     """Upper bound of the clearance of a body and of the obstacle whose box is nearest.
 
-    At the first row of a block; inf for a body without pairs.
+    At a row of the block, whose number is that of the first interval of the nearest
+    box; inf for a body without pairs.
     """
     apart()
-    pair, least, space = -1, np.inf, work.space
+    pair, row, least, space = -1, 0, np.inf, work.space
     for o in range(broad.number.shape[1]):
         if broad.number[body, o] >= 0 and broad.gap[body, o] < least:
             pair, least = broad.number[body, o], broad.gap[body, o]
+            row = broad.when[1, o] - start
     if pair < 0:
         return np.inf
     pair = finer(task.pairs, pair, pair)
     mover = seen(task, work.rows, pair)
-    place_disc(mover, work.rows, work.runs, 1)
-    load_rows(task, mover, work, 0, 0)
+    place_disc(mover, work.rows, work.runs, row + 1)
+    load_rows(task, mover, work, row, row)
     space.out[NORMAL : NORMAL + 3] = 1.0
     measuring = Measuring(space.scratch, space.nodes, space.trial, space.out)
     obstacle = task.pairs.obstacle[pair]
@@ -63,24 +70,52 @@ def _settle_body(
     Args:
         task: The scene, pairs and rules.
         results: For the least clearance met.
-        broad: `gap` of the body is read, `far` written.
+        broad: `gap` and `reach` of the body become inf where not far, `far` is written.
         body: The body.
         upper: Upper bound of the distance of its nearest obstacle; [m].
         n_near: Near pairs so far.
     """
     apart()
     threshold = max(upper, results.limit[ACROSS])
-    gap, far, number = broad.gap[body], broad.far[body], broad.number[body]
+    gap, reach = broad.gap[body], broad.reach[body]
+    far, number = broad.far[body], broad.number[body]
     for o in range(gap.size):
         required = task.pairs.required[max(number[o], 0)]
         far[o] = gap[o] >= max(threshold, required) and number[o] >= 0
     for o in range(gap.size):
         if not far[o]:
-            gap[o] = np.inf
+            gap[o] = reach[o] = np.inf
             if number[o] >= 0:
                 broad.near[n_near] = number[o]
                 n_near += 1
     return n_near
+
+
+@compiled
+def _bound_body(
+    task: Task, work: Workspace, broad: BroadPhase, body: int, stretch: Stretch
+) -> None:
+    """Bounds of a body over a block to all obstacles, by boxes over a few intervals."""
+    apart()
+    rows, pair, low, high = work.rows, broad.some[body], np.zeros(3), np.zeros(3)
+    gap, reach, when = broad.gap[body], broad.reach[body], broad.when
+    count, rise = stretch.size, task.rules.pad - task.bodies.radius[body]
+    gap[:] = reach[:] = np.inf
+    length, own = count, body_box(task, rows, (0, 1), pair, low, high)
+    while length > 1:
+        if body_box(task, rows, (0, length), pair, low, high) <= SPREAD * own:
+            break
+        length //= 2
+    for first in range(0, count, length):
+        body_box(task, rows, (first, min(first + length, count)), pair, low, high)
+        box_gaps(broad.box, low, high, broad.trial[0])
+        box_reaches(broad.point, low, high, rise, broad.trial[1])
+        when[0] = stretch.start + first
+        keep_least(broad.trial[0], when[0], gap, when[1])
+        keep_least(broad.trial[1], when[0], reach, when[2])
+    for o in range(gap.size):
+        number = broad.number[body, o]
+        gap[o] -= task.pairs.lost[number] if number >= 0 else 0.0
 
 
 @compiled
@@ -103,36 +138,26 @@ def settle_far(
     n_bodies, n_obstacles = broad.gap.shape
     if n_obstacles <= FEW:
         return broad.near.size
-    rules, rows, n_near = task.rules, work.rows, 0
-    start, count = stretch.start, stretch.size
-    low, high, lost = np.zeros(3), np.zeros(3), task.pairs.lost
+    n_near, start, count = 0, stretch.start, stretch.size
     for body in range(n_bodies):
-        gap, reach = broad.gap[body], broad.reach[body]
         if broad.some[body] < 0:
-            gap[:] = reach[:] = np.inf
+            broad.gap[body, :] = broad.reach[body, :] = np.inf
             broad.far[body, :] = False
             continue
-        body_box(task, rows, count, broad.some[body], low, high)
-        box_gaps(broad.box, low, high, gap)
-        radius = task.bodies.radius[body]
-        for o in range(n_obstacles):
-            pair = broad.number[body, o]
-            gap[o] -= lost[pair] if pair >= 0 else 0.0
-        upper = _nearest_upper(task, work, broad, body)
-        if rules.nominal:
+        _bound_body(task, work, broad, body, stretch)
+        upper = _nearest_upper(task, work, broad, body, start)
+        if task.rules.nominal:
             results.limit[ACROSS] = min(results.limit[ACROSS], upper)
         n_near = _settle_body(task, results, broad, body, upper, n_near)
-        far, settled = broad.far[body], broad.settled[body]
-        rise_of = rules.pad - radius
-        box_reaches(broad.point, low, high, rise_of, far, reach)
         for o in range(n_obstacles):
-            settled[o] += count if far[o] else 0
-        keep_least(gap, broad.lower[body], broad.at_lower[body], start)
-        keep_least(reach, broad.upper[body], broad.at_upper[body], start)
+            broad.settled[body, o] += count if broad.far[body, o] else 0
+        gap, reach, when = broad.gap[body], broad.reach[body], broad.when
+        keep_least(gap, when[1], broad.lower[body], broad.at_lower[body])
+        keep_least(reach, when[2], broad.upper[body], broad.at_upper[body])
     for pair in broad.others:
         broad.near[n_near] = pair
         n_near += 1
     profile_far(task, results, broad, start, count)
     if results.dense.verdict.shape[0] > 0:
-        dense_far(task, results.dense, rows, broad, stretch.offset, count)
+        dense_far(task, results.dense, work.rows, broad, stretch.offset, count)
     return n_near

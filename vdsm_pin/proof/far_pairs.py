@@ -33,11 +33,14 @@ class BroadPhase(NamedTuple):
         gap: Lower bounds of a block, inf where not far, shape (n_bodies, n_obstacles);
             [m].
         reach: Upper bounds of a block, inf where not far, the same shape; [m].
+        trial: Lower and upper bounds of some intervals, shape (2, n_obstacles); [m].
+        when: Intervals of one body's bounds: of `trial`, of `gap` and of `reach`, shape
+            (3, n_obstacles).
         far: Which pairs are far, the same shape.
         near: The pairs that are not, in no order, shape (n_pairs,).
         lower: Least lower bounds of far pairs, shape (n_bodies, n_obstacles); [m].
         upper: Least upper bounds, the same shape; [m].
-        at_lower: First interval of the block of the former, the same shape.
+        at_lower: Intervals of the former, the same shape.
         at_upper: Of the latter, the same shape.
         settled: Intervals in which a pair was far, the same shape.
         least: Least lower and upper bounds by obstacle, shape (2, n_obstacles); [m].
@@ -51,6 +54,8 @@ class BroadPhase(NamedTuple):
     point: FloatArray
     gap: FloatArray
     reach: FloatArray
+    trial: FloatArray
+    when: IntArray
     far: BoolArray
     near: IntArray
     lower: FloatArray
@@ -97,6 +102,8 @@ def new_broad_phase(task: Task, n_obstacles: int) -> BroadPhase:
         point,
         np.zeros(shape),
         np.zeros(shape),
+        np.zeros((2, n)),
+        np.zeros((3, n), np.int64),
         np.zeros(shape, np.bool_),
         np.arange(n_pairs),
         np.full(shape, np.inf),
@@ -109,10 +116,12 @@ def new_broad_phase(task: Task, n_obstacles: int) -> BroadPhase:
 
 
 @compiled
-def keep_least(values: FloatArray, least: FloatArray, at: IntArray, k: int) -> None:
+def keep_least(
+    values: FloatArray, when: IntArray, least: FloatArray, at: IntArray
+) -> None:
     """Keep the least values met and the intervals they were met at."""
     for o in range(values.size):
-        at[o] = k if values[o] < least[o] else at[o]
+        at[o] = when[o] if values[o] < least[o] else at[o]
     for o in range(values.size):
         least[o] = values[o] if values[o] < least[o] else least[o]
 

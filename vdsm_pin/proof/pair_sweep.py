@@ -55,7 +55,7 @@ from vdsm_pin.proof.workspace import Workspace, load_rows, take_frame
 FIRST_TRIED: Final = 4
 """Intervals that a new plane is tried on at first; doubled as long as it serves."""
 
-ROUGH: Final = 0.1
+ROUGH: Final = 0.2
 """Part of the slack that a new plane may miss, where it is not looked at closely."""
 
 
@@ -113,8 +113,8 @@ def _renew(
     p, last = pieces.node_range[root]
     load_rows(task, mover, work, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
+    goal = Goal(goal.width, goal.part, mover.lost, np.inf)
     if last - p == 1:
-        goal = Goal(goal.width, goal.part, mover.lost, np.inf)
         leaf_bracket(pieces, space, p, goal, True, space.out)
     else:
         loaded_bound(task, space, row, True, bar)
@@ -125,19 +125,26 @@ def _renew(
     n, stack, point = plane[:3], space.stack, space.scratch[0]
     plane[SUPPORT] = node_support(pieces, root, n, stack, point)
     if mover.inverse < 0.0:
-        _renew_witness(task, row, work, local, plane)
+        _renew_witness(task, row, work, local, plane, goal)
     return proved
 
 
 @compiled
 def _renew_witness(
-    task: Task, row: int, work: Workspace, local: int, plane: FloatArray
+    task: Task, row: int, work: Workspace, local: int, plane: FloatArray, goal: Goal
 ) -> None:
-    """Witnesses on a body that is no segment and on its partner, both at one row."""
+    """Witnesses on a body that is no segment and on its partner, both at one row.
+
+    As near to the distance as the plane, where the partner is of one piece.
+    """
     mover, space, rows = seen(task, work.rows, row), work.space, work.rows
     load_rows(task, mover, work, local, local)
     space.out[NORMAL:NEAR] = plane[:3]
-    loaded_bound(task, space, row, True, np.inf)
+    p, last = task.pieces.node_range[task.pieces.root[task.pairs.obstacle[row]]]
+    if last - p == 1:
+        leaf_bracket(task.pieces, space, p, goal, True, space.out)
+    else:
+        loaded_bound(task, space, row, True, np.inf)
     plane[POINT:WIDTH] = space.out[FAR:BRACKET]
     own = plane[OWN_POINT:POINT]
     own[:] = space.out[NEAR:FAR]
