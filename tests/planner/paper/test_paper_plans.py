@@ -1,5 +1,6 @@
 """Whole plans of the paper's rule: published numbers, random scenes, refusals."""
 
+import re
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -135,6 +136,24 @@ def test_the_widest_region_is_found_that_draws_as_much(
         margin = too_much - problem.required_clearance
         wider = plan_paper(problem, clearance, margin)
         assert drawn_length(wider) < drawn_length(first) - 1e-3
+
+
+def test_the_widest_region_counts_from_the_margin_that_is_asked_for() -> None:
+    """A margin of 2 mm is less than the widest region has: that is found again.
+
+    It is sought up to the clearance at the start, in so many steps.
+    """
+    problem, clearance = paper("obs1"), link_clearance(paper("obs1"))
+    start = float(clearance(plan_of("obs1").centres[:1]).min())
+    kept = []
+    for margin in (0.0, np.full(8, 2e-3)):
+        plan = plan_paper_clearest(problem, clearance, margin)
+        kept.append(float(clearance(plan.centres).min()))
+        (found,) = re.findall(r"keep more than ([\d.]+) mm", plan.notes[-1])
+        assert 1e-3 * float(found) <= kept[-1]
+        wider = plan_paper(problem, clearance, 1e-3 * float(found) + start / 1024)
+        assert drawn_length(wider) < drawn_length(plan) - 1e-3
+    assert kept[0] == pytest.approx(kept[1], abs=start / 1024)
 
 
 def test_without_a_wider_region_the_plan_is_that_of_the_rule() -> None:

@@ -6,6 +6,8 @@
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from vdsm_pin.planner.largest_margin import told, widest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
@@ -22,12 +24,12 @@ def plan_paper_clearest(
 
     Arguments and errors are those of `plan_paper`.
     """
-    required, name = problem.required_clearance, "paper-clearest"
+    kept, name = problem.required_clearance + np.max(margin), "paper-clearest"
     first = plan_paper(problem, clearance, margin)
     if not problem.scene.obstacles:
         return replace(first, strategy=name)
-    low = float(clearance(first.centres).min()) - required
-    high = float(clearance(first.centres[:1]).min()) - required
+    low = float(clearance(first.centres).min()) - kept
+    high = float(clearance(first.centres[:1]).min()) - kept
     plans, reserve = widest(
         lambda more: plan_paper(problem, clearance, margin + more),
         first,
@@ -35,5 +37,5 @@ def plan_paper_clearest(
         high,
         rounds=ROUNDS,
     )
-    notes = (*plans[-1].notes, told(required + reserve))
+    notes = (*plans[-1].notes, told(kept + reserve))
     return replace(plans[-1], strategy=name, notes=notes)
