@@ -155,6 +155,7 @@ def narrow(
             best = results.best[pair]
             best[UP], best[AT_UPPER] = found.upper[pair], found.interval[pair]
             best[TIME], best[OWN:] = found.time[pair], found.points[pair]
+        results.limit[group] = min(results.limit[group], found.instant[pair])
     # Where not all was looked at again, what was proved before holds.
     if not clock() > task.rules.until:
         _raise_bounds(task, results, group, heap, count)

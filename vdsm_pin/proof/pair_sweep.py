@@ -55,7 +55,7 @@ from vdsm_pin.proof.workspace import Workspace, load_rows, take_frame
 FIRST_TRIED: Final = 4
 """Intervals that a new plane is tried on at first; doubled as long as it serves."""
 
-ROUGH: Final = 0.2
+ROUGH: Final = 0.1
 """Part of the slack that a new plane may miss, where it is not looked at closely."""
 
 

@@ -69,6 +69,7 @@ class Witnesses(NamedTuple):
         interval: Where they were met, shape (n_pairs,).
         time: When in that interval, shape (n_pairs,).
         points: Core points as in a `Witness`, shape (n_pairs, 6); [m].
+        instant: Least bounds proved for one instant, shape (n_pairs,); [m].
         limit: Least upper bound met before; [m].
     """
 
@@ -76,6 +77,7 @@ class Witnesses(NamedTuple):
     interval: IntArray
     time: FloatArray
     points: FloatArray
+    instant: FloatArray
     limit: float
 
 
@@ -97,6 +99,7 @@ def new_witnesses(n_pairs: int, limit: float) -> Witnesses:
         np.zeros(n_pairs, np.int64),
         np.zeros(n_pairs),
         np.zeros((n_pairs, 6)),
+        np.full(n_pairs, np.inf),
         limit,
     )
 
@@ -310,6 +313,7 @@ def tighten(
         examine(slicing, row, middle, witness)
         least = min(least, witness.value[INSTANT])
         pair = int(row[PAIR])
+        witnesses.instant[pair] = min(witnesses.instant[pair], witness.value[INSTANT])
         if witness.value[MET] < witnesses.upper[pair]:
             witnesses.upper[pair] = witness.value[MET]
             witnesses.interval[pair] = int(row[INTERVAL])
