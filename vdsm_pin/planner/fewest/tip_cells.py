@@ -152,7 +152,7 @@ class TipCells(Octree):
                 return None
             back = doubt_to(ends[1:], first, neighbours, cost)
             # The more cells there are, the more are halved at once.
-            detour = DETOUR * (1.0 + MORE * self.codes.size / most)
+            detour = DETOUR * (1.0 + MORE * self.codes.size / self.most)
             detour *= min(best, self.longest)
             halved = doubt & (there + back <= best + detour + cost)
             route = self._traced(int(ends[1]), int(ends[0]), there, first, neighbours)
