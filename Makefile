@@ -37,6 +37,7 @@ figures: $(VENV)/.installed
 	$(BIN)/python analysis/conventions.py
 	$(BIN)/python analysis/theory_pictures.py
 	$(BIN)/python analysis/architecture_picture.py
+	$(BIN)/python analysis/module_index.py
 
 report: figures
 	$(BIN)/python analysis/paper_table.py --out reports/paper

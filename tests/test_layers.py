@@ -198,16 +198,6 @@ def test_only_the_command_line_knows_the_certificate_checker() -> None:
         assert not any(owner(n) == "certificate_checker" for n in imported(path)), path
 
 
-@pytest.mark.parametrize(
-    "folder", [".", "planner/fewest", "planner/impossible", "proof"]
-)
-def test_architecture_names_every_module(folder: str) -> None:
-    text = (PACKAGE.parent / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    modules = {path.stem for path in (PACKAGE / folder).glob("[!_]*.py")}
-    assert modules
-    assert not modules - set(re.findall(r"\w+", text))
-
-
 def defined(dotted: str) -> tuple[Path, str]:
     """The module of a function, class or method, and its last name.
 
