@@ -72,7 +72,7 @@ def test_a_way_that_is_gone_back_is_left_along_the_same_curve() -> None:
 def test_a_corner_too_sharp_names_the_joint_and_the_tip() -> None:
     """Square round a corner: a short link behind a long one bends by 90 deg."""
     insertion = np.array([[1.0, 0.0, 0.0], [1.0, 1.2, 0.0]])
-    with pytest.raises(NoPlanFound, match=r"joint \d would bend by \d+\.\d deg"):
+    with pytest.raises(NoPlanFound, match=r"joint \d would bend by \d+\.\d°"):
         plan_and_verify(task(insertion, np.array([[1.0, 1.4, 0.0]])), NAME)
 
 

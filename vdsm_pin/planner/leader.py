@@ -102,8 +102,8 @@ def _check_cone(problem: PlanningProblem, psi: FloatArray, tips: FloatArray) -> 
         row, joint = divmod(int(np.argmax(psi)), arm.n_links)
         message = (
             f"with the tip at {problem.in_file(tips[row])} joint {joint + 1} would "
-            f"bend by {np.rad2deg(psi[row, joint]):.1f} deg to follow it, the limit is "
-            f"{np.rad2deg(arm.max_link_angle):.1f} deg: round the corners of "
+            f"bend by {np.rad2deg(psi[row, joint]):.1f}° to follow it, the limit is "
+            f"{np.rad2deg(arm.max_link_angle):.1f}°: round the corners of "
             "`insertion`, which no link should pass at once"
         )
         raise NoPlanFound(message)

@@ -37,7 +37,7 @@ def waited(plan: Plan, problem: PlanningProblem) -> Plan:
         times, order = np.append(scene.start_time, times), np.append(0, order)
     note = (
         f"waits at the start until {scene.rest_time:g} s, when all obstacles have come "
-        f"to rest; then goes at {np.rad2deg(TURNING):.0f} deg/s and {in_mm(SLIDING)}/s "
+        f"to rest; then goes at {np.rad2deg(TURNING):.0f}°/s and {in_mm(SLIDING)}/s "
         "at most, and any other pace will do"
     )
     return replace(

@@ -159,7 +159,7 @@ def test_a_camera_looks_through_a_window_within_the_errors(
 def test_a_cone_that_errors_use_up_is_refused_with_both_numbers() -> None:
     pointing = Pointing(float(np.deg2rad(3.0)), directions=AHEAD)
     task = replace(looking(pointing), errors=ErrorBox(joint=float(np.deg2rad(0.3))))
-    with pytest.raises(NoPlanFound, match=r"by 3\.394 deg .* cone has 3\.000 deg"):
+    with pytest.raises(NoPlanFound, match=r"by 3\.394° .* cone has 3\.000°"):
         planned(task)
 
 

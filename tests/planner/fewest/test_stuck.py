@@ -158,9 +158,7 @@ def test_what_keeps_an_arm_from_following_its_tip_is_named() -> None:
     aside = np.linspace(0.0, 1.0, 101)[1:, None] * [0.0, 1.0, 0.0]
     told = following(task, np.vstack([x, x[-1] + aside]))
     # The last link turns by acos(1 - s / l) about once the tip is s aside.
-    assert re.search(
-        r"bend joint 8 by 4\d\.\d deg of 42\.5 deg with the tip", told.words
-    )
+    assert re.search(r"bend joint 8 by 4\d\.\d° of 42\.5° with the tip", told.words)
     assert "max_link_angle_deg" in told.advice
     told = following(replace(task, manipulator=replace(arm, base_range=(-5, -2.5))), x)
     assert "its base at x0 = −2496.000 mm, and the rail is" in told.words

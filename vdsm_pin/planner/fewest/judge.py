@@ -72,9 +72,9 @@ def check_cone(problem: PlanningProblem) -> None:
     least = float(error.widening(sizes, np.zeros(1)).min())
     if least >= pointing.cone:
         message = (
-            f"errors may turn the last link by {np.rad2deg(least):.3f} deg against "
-            f"where it shall look, and its cone has {np.rad2deg(pointing.cone):.3f} "
-            "deg: no motion can be proved to look there; try smaller errors or a "
+            f"errors may turn the last link by {np.rad2deg(least):.3f}° against "
+            f"where it shall look, and its cone has {np.rad2deg(pointing.cone):.3f}°"
+            ": no motion can be proved to look there; try smaller errors or a "
             "wider cone"
         )
         raise NoPlanFound(message)

@@ -132,7 +132,7 @@ def _check_limits(judge: Judge, tip: FloatArray, offsets: FloatArray) -> None:
         )  # fmt: skip
     if not bend <= judge.limit + TOLERANCES.joint_limit:
         message = (
-            f"the arm starts with a link angle of {np.rad2deg(bend):.4g} deg, and this "
-            f"strategy bends joints by at most {np.rad2deg(judge.limit):.4g} deg"
+            f"the arm starts with a link angle of {np.rad2deg(bend):.4g}°, and this "
+            f"strategy bends joints by at most {np.rad2deg(judge.limit):.4g}°"
         )
         raise NoPlanFound(message)

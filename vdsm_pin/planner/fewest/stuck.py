@@ -124,7 +124,7 @@ def _broken(problem: PlanningProblem, centres: FloatArray) -> Iterator[tuple[str
     joint = int(np.argmax(bends))
     if bends[joint] > arm.max_link_angle:
         asked, limit = np.rad2deg([bends[joint], arm.max_link_angle])
-        words = f"bend joint {joint + 1} by {asked:.1f} deg of {limit:.1f} deg"
+        words = f"bend joint {joint + 1} by {asked:.1f}° of {limit:.1f}°"
         yield words, "a larger `max_link_angle_deg` or links shorter against the turn"
     base, (low, high) = float(centres[0, 0]), arm.base_range
     if not low <= base <= high:

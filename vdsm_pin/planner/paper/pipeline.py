@@ -158,7 +158,7 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Pap
     if (turns <= 1.0).all():  # the tip strays a little more than was aimed at
         return motion
     message = (
-        f"a joint turns by {np.rad2deg(steps.max()):.1f} deg at once near waypoint "
+        f"a joint turns by {np.rad2deg(steps.max()):.1f}° at once near waypoint "
         f"{int(np.argmax(steps))}: the paper's rule is not continuous there"
     )
     raise NoPlanFound(message)
