@@ -14,7 +14,7 @@ from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.plane_bounds import bound_above, bound_below
 from vdsm_pin.proof.results import Results, note_block, note_upper, own_up
 from vdsm_pin.proof.row_places import fill_rows, seen
-from vdsm_pin.proof.rows import BLOCK
+from vdsm_pin.proof.rows import BLOCK, TURNED
 from vdsm_pin.proof.terms import ACROSS, CERTIFIED, WITHIN, Task
 from vdsm_pin.proof.witnesses import place_best
 from vdsm_pin.proof.workspace import Workspace
@@ -89,11 +89,11 @@ def _sweep(
 ) -> bool:
     """`sweep` of what is borrowed."""
     apart()
-    grown = work.rows.block
-    if task.rules.steady and grown[4]:
+    block = work.rows.block
+    if task.rules.steady and block[TURNED]:
         # Whoever asks about several error boxes leaves here what the last one added.
         work.runs.growth[:] = 0.0
-    grown[4] = not task.rules.steady
+    block[TURNED] = not task.rules.steady
     limit, settled = results.limit, np.zeros(2, np.bool_)
     before, (first, last) = limit.copy(), span
     for start in range(first, last, BLOCK):

@@ -22,6 +22,7 @@ from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import fill_rows
+from vdsm_pin.proof.rows import BEGIN, COUNT
 from vdsm_pin.proof.search import Slicing, new_witnesses, tighten
 from vdsm_pin.proof.terms import ACROSS, Task
 from vdsm_pin.proof.workspace import Workspace
@@ -81,7 +82,9 @@ def _look_again(
             beyond[group] = min(beyond[group], held.lower[c])
             continue
         start, size, pair = held.first[c], held.size[c], held.pair[c]
-        if start != block[5] or size != block[1]:  # what was judged last is there
+        if (
+            start != block[BEGIN] or size != block[COUNT]
+        ):  # what was judged last is there
             fill_rows(task, motion, work.rows, start, size)
         stretch = Stretch(start, 0, size, True, False, True)
         sweep_pair(task, motion, work, results, pair, stretch)

@@ -84,7 +84,7 @@ class Stretch(NamedTuple):
 @compiled
 def _renew(
     task: Task,
-    row: int,
+    version: int,
     work: Workspace,
     local: int,
     pair: int,
@@ -95,7 +95,7 @@ def _renew(
 
     Args:
         task: The scene, pairs and rules.
-        row: The row of the pair or of its rough version, of which they are to be.
+        version: The pair, or its rough version, of which they are to be.
         work: Working space, its rows filled.
         local: The interval.
         pair: The pair.
@@ -108,8 +108,8 @@ def _renew(
     """
     apart()
     pieces, space, plane = task.pieces, work.space, work.planes[pair]
-    root, proved = pieces.root[task.pairs.obstacle[row]], -np.inf
-    mover, plane[ROW] = seen(task, work.rows, row), row
+    root, proved = pieces.root[task.pairs.obstacle[version]], -np.inf
+    mover, plane[ROW] = seen(task, work.rows, version), version
     p, last = pieces.node_range[root]
     load_rows(task, mover, work, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
@@ -117,7 +117,7 @@ def _renew(
     if last - p == 1:
         leaf_bracket(pieces, space, p, goal, True, space.out)
     else:
-        loaded_bound(task, space, row, True, bar)
+        loaded_bound(task, space, version, True, bar)
         proved = space.out[LOWER]
         if space.body.discs[0, RADIUS] == 0.0:
             hold(plane, proved, space.body)
@@ -125,26 +125,26 @@ def _renew(
     n, stack, point = plane[:3], space.stack, space.scratch[0]
     plane[SUPPORT] = node_support(pieces, root, n, stack, point)
     if mover.inverse < 0.0:
-        _renew_witness(task, row, work, local, plane, goal)
+        _renew_witness(task, version, work, local, plane, goal)
     return proved
 
 
 @compiled
 def _renew_witness(
-    task: Task, row: int, work: Workspace, local: int, plane: FloatArray, goal: Goal
+    task: Task, version: int, work: Workspace, local: int, plane: FloatArray, goal: Goal
 ) -> None:
     """Witnesses on a body that is no segment and on its partner, both at one row.
 
     As near to the distance as the plane, where the partner is of one piece.
     """
-    mover, space, rows = seen(task, work.rows, row), work.space, work.rows
+    mover, space, rows = seen(task, work.rows, version), work.space, work.rows
     load_rows(task, mover, work, local, local)
     space.out[NORMAL:NEAR] = plane[:3]
-    p, last = task.pieces.node_range[task.pieces.root[task.pairs.obstacle[row]]]
+    p, last = task.pieces.node_range[task.pieces.root[task.pairs.obstacle[version]]]
     if last - p == 1:
         leaf_bracket(task.pieces, space, p, goal, True, space.out)
     else:
-        loaded_bound(task, space, row, True, np.inf)
+        loaded_bound(task, space, version, True, np.inf)
     plane[POINT:WIDTH] = space.out[FAR:BRACKET]
     own = plane[OWN_POINT:POINT]
     own[:] = space.out[NEAR:FAR]
@@ -277,7 +277,12 @@ def sweep_pair(
     pair: int,
     stretch: Stretch,
 ) -> bool:
-    """All intervals of a block for one pair.
+    """All intervals of a block for one pair, from first to last.
+
+    An interval is tried with the plane that served last, with all after it; where that
+    misses, with a new one of the roughest version of the pair, with a window of those
+    after it, which doubles as long as the plane serves; then with one of the next finer
+    version; what even the pair's own plane misses is subdivided.
 
     Returns:
         False where only a yes or no is asked and an interval is not proved, or where
@@ -302,52 +307,53 @@ def sweep_pair(
         of_clearance = part if mover_of(task, pair).inverse < 0.0 else 0.0
         goal = Goal(max(rules.goal, part * required), of_clearance, 0.0, np.inf)
     slack = np.inf if yes_or_no else rules.slack
-    local, tried, fresh, proved = 0, count, False, -np.inf
-    row = int(plane[ROW]) if plane[SUPPORT] > -np.inf else finer(task.pairs, pair, pair)
-    mover = seen(task, rows, row)
+    local, window, is_new, proved = 0, count, False, -np.inf
+    roughest = finer(task.pairs, pair, pair)
+    version = int(plane[ROW]) if plane[SUPPORT] > -np.inf else roughest
+    mover = seen(task, rows, version)
     if not plane[SUPPORT] > -np.inf:
         _face(task, mover, rows, plane, pair)
     place_disc(mover, rows, runs, count)
     place_own(mover, rows, runs, plane, count)
     while clock() <= rules.until:
-        last, bar = min(count, local + tried), required
+        last, bar = min(count, local + window), required
         if stretch.closely:
             bar = max(bar, results.limit[group] - rules.gap)
-        demand = Demand(local, last, bar, slack, fresh, proved)
+        demand = Demand(local, last, bar, slack, is_new, proved)
         done = local
-        if fresh or plane[SUPPORT] > -np.inf:
+        if is_new or plane[SUPPORT] > -np.inf:
             done = try_plane(task, mover, rows, runs, plane, demand)
-        if fresh and done == local:
+        if is_new and done == local:
             most = runs.lower[local] + mover.loose + rules.goal
-            if row != pair and most >= required:
+            if version != pair and most >= required:
                 # What few corners do not settle more of them may.
-                row = finer(task.pairs, pair, row)
-                mover = seen(task, rows, row)
-                proved = _renew(task, row, work, local, pair, goal, bar)
+                version = finer(task.pairs, pair, version)
+                mover = seen(task, rows, version)
+                proved = _renew(task, version, work, local, pair, goal, bar)
                 continue
             # This interval allows no more, and may be proved nevertheless.
-            done += runs.lower[local] >= required or stretch.again
+            if runs.lower[local] >= required or stretch.again:
+                done += 1
         if done > local:
             span = local, done
             _note_stretch(task, mover, work, results, pair, stretch, span)
-        elif fresh:
+        elif is_new:
             if yes_or_no and runs.upper[local] < required:
                 return False
             verdict = _subdivide(task, motion, work, results, pair, stretch, local)
             if yes_or_no and verdict != CERTIFIED:
                 return False
             done = local + 1
-        fresh, local = False, done
+        is_new, local = False, done
         if local == count:
             return True
         if done == last:
-            tried *= 2
+            window *= 2
             continue
-        row = finer(task.pairs, pair, pair)
-        mover = seen(task, rows, row)
-        proved = _renew(task, row, work, local, pair, goal, bar)
+        version, mover = roughest, seen(task, rows, roughest)
+        proved = _renew(task, version, work, local, pair, goal, bar)
         results.tally[RENEWED] += 1
         if not (rules.nominal or yes_or_no):
             _look_at_row(task, work, results, local, pair)
-        fresh, tried = True, FIRST_TRIED
+        is_new, window = True, FIRST_TRIED
     return False

@@ -9,7 +9,20 @@ from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.row_bends import bend_way, bound_joints, drift_way
 from vdsm_pin.proof.row_frames import move_frame
-from vdsm_pin.proof.rows import BEND, DRIFT, SWING, TURN, Rows, carry, to_frame
+from vdsm_pin.proof.rows import (
+    BEGIN,
+    BEND,
+    COUNT,
+    CURVED,
+    DRIFT,
+    NUMBER,
+    PLACED,
+    SWING,
+    TURN,
+    Rows,
+    carry,
+    to_frame,
+)
 from vdsm_pin.proof.terms import Mover, Places, Task, mover_of
 from vdsm_pin.proof.ways import WayErrors, Ways
 
@@ -23,7 +36,7 @@ def _bend_places(
 ) -> None:
     """How far some places leave their chords, and D where errors turn."""
     apart()
-    turning, straight = errors.any_turn, rows.block[2] == 0
+    turning, straight = errors.any_turn, rows.block[CURVED] == 0
     for place in wanted:
         way, lever = places.way[place], places.lever[place]
         own, sag = rows.ways[way], rows.tracks.sags[place, :count]
@@ -64,7 +77,7 @@ def _see_places(
     places: Places, ways: Ways, errors: WayErrors, rows: Rows, wanted: IntArray
 ) -> None:
     """Find where some places go over the block."""
-    count = rows.block[1]
+    count = rows.block[COUNT]
     _set_places(places, ways, rows, wanted, count + 1)
     _bend_places(places, errors, rows, wanted, count)
 
@@ -74,16 +87,17 @@ def _see_corners(task: Task, rows: Rows, corners: IntArray) -> None:
     """The same of a body's corners, and what they stem from, unless it is known."""
     apart()
     places, known, size, new = task.places, rows.tracks.known, 0, False
+    number = rows.block[NUMBER]
     for corner in corners:
-        new |= known[corner] != rows.block[0]
+        new |= known[corner] != number
     if not new:
         return
     missing = np.zeros(2 * corners.size, np.int64)
     for in_world in (True, False):
         for corner in corners:
             place = places.point[corner] if in_world else corner
-            if known[place] != rows.block[0]:
-                known[place], missing[size] = rows.block[0], place
+            if known[place] != number:
+                known[place], missing[size] = number, place
                 size += 1
     _see_places(places, task.ways, task.errors, rows, missing[:size])
 
@@ -92,7 +106,7 @@ def _see_corners(task: Task, rows: Rows, corners: IntArray) -> None:
 def seen(task: Task, rows: Rows, pair: int) -> Mover:
     """The moving side of a pair or rough version, its corners known over the block."""
     mover = mover_of(task, pair)
-    if rows.block[3] == 0:
+    if rows.block[PLACED] == 0:
         _see_corners(task, rows, mover.slots)
     return mover
 
@@ -106,9 +120,10 @@ def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) ->
     apart()
     tree, ways, errors = task.tree, task.ways, task.errors
     straight = motion.inner.shape[1] == 0
-    rows.block[0] += 1
-    rows.block[1], rows.block[2], rows.block[3] = count, 0 if straight else 1, 0
-    rows.block[5] = first
+    block = rows.block
+    block[NUMBER] += 1
+    block[BEGIN], block[COUNT] = first, count
+    block[CURVED], block[PLACED] = 0 if straight else 1, 0
     for joint in range(tree.parent.size):
         move_frame(tree, motion, rows, first, count + 1, joint)
     bound_joints(tree, motion, rows, first, count)
@@ -119,4 +134,4 @@ def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) ->
                 drift_way(tree, ways, errors.erring, rows, way, count)
     if task.places.way.size <= FEW_PLACES:
         _see_places(task.places, ways, errors, rows, task.places.every)
-        rows.block[3] = 1
+        block[PLACED] = 1

@@ -45,9 +45,7 @@ class Rows(NamedTuple):
         joints: Bounds of each joint's value, its rate and how fast that changes, shape
             (n_joints, 3, BLOCK).
         work: Working space, shape (8, BLOCK + 1).
-        block: Number of the block, from 1, its intervals, 1 where pieces are not
-            straight, 1 where all places are known, 1 where errors turned in what was
-            judged last, and the first interval, shape (6,).
+        block: What the rows are of, laid out as below, shape (BLOCK_STATE,).
     """
 
     frames: FloatArray
@@ -75,6 +73,17 @@ DRIFT: Final = 2
 SWING: Final = 3
 """Layout of what is bounded along a way."""
 
+NUMBER: Final = 0
+COUNT: Final = 1
+CURVED: Final = 2
+PLACED: Final = 3
+TURNED: Final = 4
+BEGIN: Final = 5
+BLOCK_STATE: Final = 6
+"""Layout of what a block of rows is of: its number, from 1; how many intervals it has;
+1 where pieces are not straight, where all places are known, and where errors turned in
+what was judged last; its first interval."""
+
 
 @compiled
 def new_rows(n_frames: int, n_ways: int, tracks: Tracks, block: int) -> Rows:
@@ -89,7 +98,7 @@ def new_rows(n_frames: int, n_ways: int, tracks: Tracks, block: int) -> Rows:
         np.zeros((n_ways, 4, block)),
         np.zeros((n_frames - 1, 3, block)),
         np.zeros((8, block + 1)),
-        np.zeros(6, np.int64),
+        np.zeros(BLOCK_STATE, np.int64),
     )
 
 
