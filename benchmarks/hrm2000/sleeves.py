@@ -64,7 +64,7 @@ Proof: TypeAlias = Callable[[PlanningProblem], BoolArray]
 
 def beyond_or_buried(problem: PlanningProblem) -> BoolArray:
     """By the tip alone."""
-    return prove_tips(problem, link_clearance(problem), problem.path.points).closed
+    return prove_tips(problem, link_clearance(problem), problem.path.points).undrawable
 
 
 def last_link_blocked(problem: PlanningProblem) -> BoolArray:

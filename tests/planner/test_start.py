@@ -254,7 +254,7 @@ def test_what_is_ignored_proves_nothing() -> None:
     path = DesiredPath(tip, POINTS, False)
     task = PlanningProblem("ball", ARM, Scene((ball,)), path, 0.0035, np.eye(4))
     rows = POINTS
-    assert prove_tips(task, link_clearance(task), rows).closed.any()
+    assert prove_tips(task, link_clearance(task), rows).undrawable.any()
     plan = plan_fewest(task, link_clearance(task), 0.0)
     assert any("proved" in words for words in plan.undrawn)
     task = replace(task, manipulator=replace(ARM, ignore_pairs=(("ball", "link 8"),)))

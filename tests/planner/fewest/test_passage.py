@@ -163,7 +163,7 @@ def test_behind_a_wall_between_two_rows_the_path_does_not_lead(wall: float) -> N
     judge = SimpleNamespace(problem=SimpleNamespace(required_clearance=0.0))
     outcome: Any = SimpleNamespace(
         rows=SimpleNamespace(tips=tips), judge=judge, drawn=blank,
-        proof=SimpleNamespace(closed=blank),
+        proof=SimpleNamespace(undrawable=blank),
     )  # fmt: skip
     space: Any = SimpleNamespace(room=room, leads_to=leads_to)
     assert _leads_there(space, outcome) == (wall > 0.04)

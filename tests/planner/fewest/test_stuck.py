@@ -112,7 +112,7 @@ def test_a_stop_is_told_with_the_station_where_it_was() -> None:
     task = behind(HALF)
     clearance, rows = broad_phase(task, link_clearance(task)), path_rows(task.path)
     proof = prove_tips(task, clearance, rows.tips)
-    route = tip_route(task, rows, proof.closed, 0.02, 0.0)
+    route = tip_route(task, rows, proof.undrawable, 0.02, 0.0)
     still = np.zeros((0, 9, 2))
     corners = Corners(np.zeros((0, 3)), still, np.zeros(0), proof.far[:0], ENDS)
     found = Found(route, corners, (len(route.layers) - 1,))

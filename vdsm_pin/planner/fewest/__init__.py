@@ -21,5 +21,5 @@ Words of these modules:
   run of nodes that is drawn, or a connection; sequence: all legs.
 * corner: a place where the motion turns in the chart; row: a configuration of the
   trajectory.
-* closed: proved that nobody can draw it; skipped: not drawn, for whatever reason.
+* undrawable: proved that nobody can draw it; skipped: not drawn, for whatever reason.
 """

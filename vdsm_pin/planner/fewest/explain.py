@@ -65,13 +65,13 @@ def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
         CutOff: No way leads to too much of the path.
     """
     rows, proof = outcome.rows, outcome.proof
-    # Of a stretch that is shut both ends are closed.
-    both = proof.closed[:-1] & proof.closed[1:]
-    shut = float(np.diff(rows.stations)[both].sum())
+    # Both ends of an undrawable stretch are undrawable rows.
+    both = proof.undrawable[:-1] & proof.undrawable[1:]
+    lost = float(np.diff(rows.stations)[both].sum())
     whole = problem.path.blocked is Blocked.FAIL
-    if proof.closed.all() or (whole and shut > 0.0):
+    if proof.undrawable.all() or (whole and lost > 0.0):
         raise _proved(problem, outcome)
-    if whole and proof.closed.any():
+    if whole and proof.undrawable.any():
         message = f"{_proved(problem, outcome)}; plans have a waypoint there"
         raise NoPlanFound(message)
 
@@ -182,7 +182,7 @@ def how_far(problem: PlanningProblem, outcome: Outcome, deadline: Deadline) -> R
     stations = outcome.rows.stations
     station, stop, tip = float(stations[0]), float(stations[-1]), outcome.rows.tips[0]
     if outcome.found is not None and route is not None:
-        skipped = [k for k in outcome.found.skipped if not route.closed[k]]
+        skipped = [k for k in outcome.found.skipped if not route.undrawable[k]]
         if skipped:
             station, stop = route.stations[skipped[0] - 1 : skipped[0] + 1].tolist()
             tip = route.tips[route.layers[skipped[0]]]
@@ -350,21 +350,21 @@ def undrawn(problem: PlanningProblem, outcome: Outcome) -> tuple[str, ...]:
     skipped = outcome.found.skipped
     for k, after in itertools.zip_longest(skipped, skipped[1:]):
         stretch.append(k)
-        if after == k + 1 and route.closed[after] == route.closed[k]:
+        if after == k + 1 and route.undrawable[after] == route.undrawable[k]:
             continue
         a, b = float(route.stations[stretch[0] - 1]), float(route.stations[k])
         why = "no way was found, which proves nothing"
-        if route.closed[k]:
-            why = f"proved: {_closed_by(problem, outcome, a, b)}"
+        if route.undrawable[k]:
+            why = f"proved: {_why_undrawable(problem, outcome, a, b)}"
         stretches.append(f"from {in_mm(a)} to {in_mm(b)} along the path ({why})")
         stretch = []
     return tuple(stretches)
 
 
-def _closed_by(
+def _why_undrawable(
     problem: PlanningProblem, outcome: Outcome, start: float, stop: float
 ) -> str:
-    """What is proved to close rows of the path between two stations, in words."""
+    """Why nobody can draw some of the path between two stations, in words."""
     rows, proof = outcome.rows, outcome.proof
     here = (rows.stations >= start) & (rows.stations <= stop)
     reasons = []

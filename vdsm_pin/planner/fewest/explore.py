@@ -5,7 +5,7 @@ Everything is counted, nothing is timed: the same problem gives the same plan.
 
 import itertools
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -23,6 +23,7 @@ from vdsm_pin.planner.fewest.levels import (
     SEED,
     Effort,
     Insert,
+    Level,
     Search,
     confined_first,
 )
@@ -129,16 +130,16 @@ def explore(
     proof = prove_tips(held_from(problem, TIP_ONLY), clearance, rows.tips)
     best = Outcome(judge, None, rows, proof)
     yield best
-    if best.proof.closed.all():
+    if best.proof.undrawable.all():
         return
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) + TOLERANCES.joint_limit
     least_ease = min(1.0, bent / link_limit(problem))
     kept = link_margins(problem.manipulator, weights.joint_error)
-    stuck: NoWayOut | None = None
-    inserted: Stuck | None = None
+    no_way_out: NoWayOut | None = None
+    stuck: Stuck | None = None
     spaces = _Spaces(problem, clearance, margin)
-    proofs = [_cut_off, _hemmed_in] if effort.proves else []
+    proofs = 2 if effort.proves else 0
     levels, confined = effort.levels, True
     while levels:
         if best.found is None and confined:
@@ -152,35 +153,37 @@ def explore(
             problem, clearance, margin, level.slack * length, level.finest * length,
             ease, clearance.up_to(worth), kept,
         )  # fmt: skip
-        now = Outcome(judge, None, rows, proof, inserted)
+        now = Outcome(judge, None, rows, proof, stuck)
         try:
             if isinstance(level, Insert):
                 now = _inserted(now, spaces.of(level), level, soon)
-                inserted = now.stuck
+                stuck = now.stuck
             elif isinstance(level, Search):
                 found, confined = _look(judge, level, rows, proof, weights)
-                now = Outcome(judge, found, rows, proof, inserted)
+                now = Outcome(judge, found, rows, proof, stuck)
         except NoWayOut as error:
-            stuck = error
+            no_way_out = error
         LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
             best = now
-        best = replace(best, stuck=inserted)
+        best = replace(best, stuck=stuck)
         yield best
         if not best.missing > 0.0 or (best.found is not None and soon.passed):
             return
         if proofs and (level is first or isinstance(level, Insert)):
             # Seldom needed, so only now: can it be done at all?
-            prove = proofs.pop(0)
-            inserts = [one for one in (level, *levels) if isinstance(one, Insert)]
-            space = spaces.of(inserts[0]) if inserts and prove is _cut_off else None
-            best = prove(problem, clearance, best, space)
+            if proofs == 2:
+                space = spaces.of_first((level, *levels))
+                best = _cut_off(problem, clearance, best, space)
+            else:
+                best = _hemmed_in(problem, clearance, best)
+            proofs -= 1
             yield best
             proof = best.proof.take(best.rows.as_stated)
-            if proof.closed.all():
+            if proof.undrawable.all():
                 return
-    if best.found is None and inserted is None and stuck is not None:
-        raise stuck
+    if best.found is None and stuck is None and no_way_out is not None:
+        raise no_way_out
 
 
 class _Spaces:
@@ -212,10 +215,16 @@ class _Spaces:
             )
         return self.known[key]
 
+    def of_first(self, levels: Iterable[Level]) -> TipSpace | None:
+        """Those for the first insertion among some levels; None without one."""
+        inserts = (level for level in levels if isinstance(level, Insert))
+        first = next(inserts, None)
+        return None if first is None else self.of(first)
+
 
 def _leads_there(space: TipSpace, outcome: Outcome) -> bool:
     """Whether ways of the tip lead to all stretches that are not drawn."""
-    open_, tips = ~outcome.proof.closed, outcome.rows.tips
+    open_, tips = ~outcome.proof.undrawable, outcome.rows.tips
     # From one row to the next the path itself leads, unless a wall is between them.
     room = space.room._replace(required=outcome.judge.problem.required_clearance)
     led = open_[:-1] & (room.spare(tips[:-1], tips[1:]) >= 0.0)
@@ -261,8 +270,8 @@ def _inserted(
 def _once_inserted(
     before: Outcome, space: TipSpace, level: Insert, soon: Deadline
 ) -> Outcome:
-    closed = before.proof.closed
-    now = insert(before.judge, space, before.rows, closed, level, soon)
+    undrawable = before.proof.undrawable
+    now = insert(before.judge, space, before.rows, undrawable, level, soon)
     return replace(before, found=now.found, stuck=now.stuck or before.stuck)
 
 
@@ -284,14 +293,11 @@ def _cut_off(
 
 
 def _hemmed_in(
-    problem: PlanningProblem,
-    clearance: BroadPhase,
-    outcome: Outcome,
-    _: TipSpace | None,
+    problem: PlanningProblem, clearance: BroadPhase, outcome: Outcome
 ) -> Outcome:
     """The outcome with rows not drawn where the last link is proved to have no room."""
     tips, proof = outcome.rows.tips, outcome.proof
-    open_ = np.flatnonzero(~(outcome.drawn | proof.closed))
+    open_ = np.flatnonzero(~(outcome.drawn | proof.undrawable))
     hemmed = np.zeros(len(tips), dtype=np.bool_)
     enough = clearance.up_to(problem.required_clearance)
     there = held_from(problem, last_link(problem))
@@ -312,7 +318,7 @@ def _look(
     length = arm.total_length
     coarse, back = level.coarse * length, level.back * length
     shapes = one_knee_shapes(arm, judge.limit, STEP, PLACES)
-    route = tip_route(problem, rows, proof.closed, coarse, back)
+    route = tip_route(problem, rows, proof.undrawable, coarse, back)
     roadmap = build_roadmap(judge, weights, route, shapes, level.around)
     roadmap, start_node = with_start(judge, roadmap, weights)
     rng, standing = np.random.default_rng(SEED), np.diff(roadmap.tip_nodes) > 0
@@ -320,7 +326,7 @@ def _look(
     for _ in range(level.grow):
         if found is None or not found.missing > 0.0:
             break
-        skipped = tuple(k for k in found.skipped if not route.closed[k])
+        skipped = tuple(k for k in found.skipped if not route.undrawable[k])
         if back == 0.0 and _unreached(found):
             break
         more = fill(judge, found.roadmap, found.lengths, skipped, rng, weights)
@@ -337,7 +343,7 @@ def _unreached(found: Searched) -> bool:
     """Whether there are nodes in the stretches not drawn that no way leads to."""
     roadmap = found.roadmap
     for k in found.skipped:
-        if roadmap.route.closed[k]:
+        if roadmap.route.undrawable[k]:
             continue
         tip = roadmap.route.layers[k]
         if not np.isfinite(found.lengths[roadmap.nodes_at(tip)]).all():

@@ -86,8 +86,8 @@ def insert(
     judge: Judge,
     space: TipSpace,
     rows: PathRows,
-    closed: BoolArray,
-    effort: Insert,
+    undrawable: BoolArray,
+    level: Insert,
     soon: Deadline = NO_LIMIT,
 ) -> Inserted:
     """A motion that draws what it can, going in as often as it takes.
@@ -96,16 +96,16 @@ def insert(
         judge: Says what is clear.
         space: Has the ways of the tip.
         rows: The desired path row by row.
-        closed: Rows that nobody can reach, shape (r,).
-        effort: How thoroughly to look.
+        undrawable: Rows that nobody can reach, shape (r,).
+        level: How thoroughly to look.
         soon: From when on what is not drawn yet is skipped, if something is drawn.
 
     Raises:
         LimitExceeded: If the start breaks a limit.
     """
-    step = effort.step * judge.problem.manipulator.total_length
-    route = tip_route(judge.problem, rows, closed, step, 0.0)
-    search = _Search(judge, space, route, effort)
+    step = level.step * judge.problem.manipulator.total_length
+    route = tip_route(judge.problem, rows, undrawable, step, 0.0)
+    search = _Search(judge, space, route, level)
     return Inserted(search.found(soon), search.stuck())
 
 
@@ -113,15 +113,15 @@ class _Search:
     """The visits of one route."""
 
     def __init__(
-        self, judge: Judge, space: TipSpace, route: TipRoute, effort: Insert
+        self, judge: Judge, space: TipSpace, route: TipRoute, level: Insert
     ) -> None:
         self.judge, self.space = judge, space
-        self.route, self.effort = route, effort
+        self.route, self.level = route, level
         self.tips = route.tips[route.layers]
-        self.root = checked_start(judge, route.tips[:1], effort.directed)
+        self.root = checked_start(judge, route.tips[:1], level.directed)
         self.back = way_back(start_centres(judge.problem))
         self.outside = space.begun_at(self.back[-1])
-        self.rng = np.random.default_rng(effort.seed)
+        self.rng = np.random.default_rng(level.seed)
         self.farthest: _Visit | None = None
         self.leans_back = False
 
@@ -134,7 +134,7 @@ class _Search:
         most = 1 if self.judge.problem.path.blocked is Blocked.FAIL else FAILURES
         while k < last:
             over = failures == most or self.leans_back or (visits and soon.passed)
-            if self.route.closed[k + 1] or over:
+            if self.route.undrawable[k + 1] or over:
                 k += 1
                 skipped.append(k)
                 begin = k
@@ -194,7 +194,7 @@ class _Search:
 
         An insertion by directions comes next, which takes the same ways.
         """
-        if self.effort.directed:
+        if self.level.directed:
             return False
         arm = self.judge.problem.manipulator
         laid = led_along(route, start_centres(self.judge.problem), arm.link_lengths)
@@ -211,8 +211,8 @@ class _Search:
 
     def _path(self, k: int) -> FloatArray:
         """Tips from a layer on to the next that nobody can reach, shape (n, 3); [m]."""
-        shut = np.flatnonzero(self.route.closed[k + 1 :])
-        return self.tips[k : k + 1 + int(shut[0]) if len(shut) else len(self.tips)]
+        ends = np.flatnonzero(self.route.undrawable[k + 1 :])
+        return self.tips[k : k + 1 + int(ends[0]) if len(ends) else len(self.tips)]
 
     def _grown(self, k: int, route: FloatArray) -> _Visit:
         """The visit by one way of the tip, shape (n, 3) [m], to layer k and on."""
@@ -222,9 +222,9 @@ class _Search:
         tips = np.vstack([route, path[1:]])
         layers = Layers(tips, tolerance, *self._aims(k, before, tips))
         population = Population(
-            self.judge, layers, self.rng, self.effort.population, self.effort.led
+            self.judge, layers, self.rng, self.level.population, self.level.led
         )
-        chain = population.grow(self.root[None], self.effort.backtracks)
+        chain = population.grow(self.root[None], self.level.backtracks)
         return _Visit(k, before, chain, route)
 
     def _aims(
@@ -258,7 +258,7 @@ class _Search:
             way = way[np.append(True, (np.diff(way, axis=0) != 0.0).any(axis=1))]
             points, _ = stepped(way, self.space.spacing)
             yield np.vstack([self.back, points[1:]])
-        yield from self.space.routes(path[0], self.effort.routes)
+        yield from self.space.routes(path[0], self.level.routes)
         yield from self.space.swing(path[0])
         if len(self.back) > 1:
             for route in self.outside.routes(path[0], 1):

@@ -56,8 +56,8 @@ class TipRoute:
         tips: Positions, shape (k, 3); [m].
         layers: Tip numbers along the desired path in drawing order, shape (l,).
         stations: Arc length along the desired path at each layer, shape (l,); [m].
-        closed: Whether it is proved that the stretch from the layer before cannot be
-            drawn, shape (l,).
+        undrawable: Whether it is proved that nobody can draw the stretch from the layer
+            before, shape (l,).
         first: Where each tip's neighbours begin, shape (k + 1,).
         links: Neighbouring tips, shape (m,).
         gaps: Distances to them, shape (m,); [m].
@@ -66,7 +66,7 @@ class TipRoute:
     tips: FloatArray
     layers: IntArray
     stations: FloatArray
-    closed: BoolArray
+    undrawable: BoolArray
     first: IntArray
     links: IntArray
     gaps: FloatArray
@@ -102,9 +102,9 @@ def path_rows(path: DesiredPath) -> PathRows:
     return PathRows(stations, path.at(wrapped), corner)
 
 
-def _layer_rows(rows: PathRows, closed: BoolArray, coarse: float) -> IntArray:
-    """Rows that become layers: corners, borders of closed stretches, some between."""
-    change = closed[1:] != closed[:-1]
+def _layer_rows(rows: PathRows, undrawable: BoolArray, coarse: float) -> IntArray:
+    """Rows that become layers: corners, ends of undrawable stretches, some between."""
+    change = undrawable[1:] != undrawable[:-1]
     kept = rows.corner.copy()
     kept[1:] |= change
     kept[:-1] |= change
@@ -127,7 +127,7 @@ def _chain(begin: FloatArray, end: FloatArray, coarse: float) -> FloatArray:
 def tip_route(
     problem: PlanningProblem,
     rows: PathRows,
-    closed: BoolArray,
+    undrawable: BoolArray,
     coarse: float,
     back: float,
 ) -> TipRoute:
@@ -136,12 +136,12 @@ def tip_route(
     Args:
         problem: What was asked.
         rows: The desired path row by row.
-        closed: Rows that nobody can reach, shape (r,).
+        undrawable: Rows that nobody can reach, shape (r,).
         coarse: Largest distance between neighbouring tips; [m].
         back: How far behind the chain there shall be tips too, along -X; [m].
     """
     path = problem.path
-    chosen = _layer_rows(rows, closed, coarse)
+    chosen = _layer_rows(rows, undrawable, coarse)
     drawn = rows.tips[chosen]
     approach = _chain(path.start, drawn[0], coarse)
     tips = np.vstack([approach, drawn])
@@ -165,11 +165,11 @@ def tip_route(
         m = len(tips)
         pairs += [(a if a < n else a - n + m, b + m) for a, b in more]
         tips = np.vstack([tips, lattice])
-    shut = np.zeros(len(chosen), dtype=np.bool_)
+    blocked = np.zeros(len(chosen), dtype=np.bool_)
     for i, (a, b) in enumerate(itertools.pairwise(chosen)):
-        shut[i + 1] = closed[a : b + 1].any()
+        blocked[i + 1] = undrawable[a : b + 1].any()
     links = np.array(pairs).reshape(-1, 2)
-    return _linked(tips, np.arange(k, last + 1), rows.stations[chosen], shut, links)
+    return _linked(tips, np.arange(k, last + 1), rows.stations[chosen], blocked, links)
 
 
 MOST_BESIDE = 16
@@ -237,7 +237,7 @@ def _linked(
     tips: FloatArray,
     layers: IntArray,
     stations: FloatArray,
-    closed: BoolArray,
+    undrawable: BoolArray,
     pairs: IntArray,
 ) -> TipRoute:
     both = np.vstack([pairs.reshape(-1, 2), pairs.reshape(-1, 2)[:, ::-1]])
@@ -245,5 +245,11 @@ def _linked(
     first = np.searchsorted(both[:, 0], np.arange(len(tips) + 1))
     gaps = np.linalg.norm(tips[both[:, 0]] - tips[both[:, 1]], axis=1)
     return TipRoute(
-        tips, layers, stations, closed, first.astype(np.int64), both[:, 1].copy(), gaps
+        tips,
+        layers,
+        stations,
+        undrawable,
+        first.astype(np.int64),
+        both[:, 1].copy(),
+        gaps,
     )

@@ -32,7 +32,9 @@ class Found:
     def missing(self) -> float:
         """Length of the path not drawn and not proved impossible to draw; [m]."""
         gaps = np.diff(self.route.stations)
-        return float(sum(gaps[k - 1] for k in self.skipped if not self.route.closed[k]))
+        return float(
+            sum(gaps[k - 1] for k in self.skipped if not self.route.undrawable[k])
+        )
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,7 @@ class TipProof:
         return TipProof(*(getattr(self, one.name)[rows] for one in fields(self)))
 
     @property
-    def closed(self) -> BoolArray:
+    def undrawable(self) -> BoolArray:
         """Any of them, shape (n,)."""
         return self.far | self.buried | self.cut_off | self.hemmed_in
 
