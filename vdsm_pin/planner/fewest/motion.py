@@ -12,7 +12,7 @@ place of the offsets (`direction_kernels.py`), and the base may be held to a sho
 
 import itertools
 from dataclasses import dataclass, fields
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -64,6 +64,24 @@ class Corners:
             self.stations[kept],
             np.array(drawn, dtype=np.bool_),
             edges,
+        )
+
+    def rerouted(
+        self, begin: int, end: int, tips: FloatArray, offsets: FloatArray
+    ) -> "Corners":
+        """Others in place of corners begin to end; nothing is drawn between them."""
+        count = len(tips) - 1
+
+        def with_those(own: Any, others: Any, rest: int) -> Any:
+            return np.concatenate([own[:begin], others, own[rest:]])
+
+        left, come = self.stations[begin], self.stations[end]
+        return Corners(
+            with_those(self.tips, tips, end + 1),
+            with_those(self.offsets, offsets, end + 1),
+            with_those(self.stations, np.append(np.full(count, left), come), end + 1),
+            with_those(self.drawn, np.zeros(count, np.bool_), end),
+            with_those(self.edges, np.full((count, 2), -1), end),
         )
 
     def unit(self, manipulator: Manipulator) -> float:

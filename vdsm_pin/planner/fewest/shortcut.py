@@ -231,25 +231,4 @@ def _stepped_back(corners: Corners, begin: int, end: int, depth: float) -> Corne
     shapes = corners.offsets[begin : end + 1]
     t = t[..., None]
     new_shapes = (1 - t) * shapes[low] + t * shapes[high]
-    count = len(values) - 1
-    return Corners(
-        np.concatenate([corners.tips[:begin], new_tips, corners.tips[end + 1 :]]),
-        np.concatenate(
-            [corners.offsets[:begin], new_shapes, corners.offsets[end + 1 :]]
-        ),
-        np.concatenate(
-            [
-                corners.stations[:begin],
-                np.append(
-                    np.full(count, corners.stations[begin]), corners.stations[end]
-                ),
-                corners.stations[end + 1 :],
-            ]
-        ),
-        np.concatenate(
-            [corners.drawn[:begin], np.zeros(count, np.bool_), corners.drawn[end:]]
-        ),
-        np.concatenate(
-            [corners.edges[:begin], np.full((count, 2), -1), corners.edges[end:]]
-        ),
-    )
+    return corners.rerouted(begin, end, new_tips, new_shapes)

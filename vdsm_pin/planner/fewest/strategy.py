@@ -159,6 +159,7 @@ class _Search:
                 there = replace(self, problem=from_there(problem, rows[-1]))
                 return with_unbending(problem, rows, there.plan(effort))
             except NoPlanFound:
+                # It does not unbend, or there is no plan from there: by directions.
                 effort = LEANING
         if problem.path.pointing is not None and effort is not LEANING:
             effort = pointed(effort)
