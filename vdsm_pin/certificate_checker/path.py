@@ -19,7 +19,7 @@ class Drawing:
     def __init__(self, path: DesiredPath) -> None:
         self.closed = path.closed and len(path.points) > 1
         self.corners = [column(*point) for point in path.points.tolist()]
-        self.corners += self.corners[: int(self.closed)]
+        self.corners += self.corners[:1] if self.closed else []
         self.stations = [arb(0)]
         for a, b in pairwise(self.corners):
             self.stations.append(self.stations[-1] + norm(b - a))

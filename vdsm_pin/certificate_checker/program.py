@@ -162,7 +162,9 @@ def main(arguments: Sequence[str]) -> int:
     try:
         outcome = check_certificate(*map(Path, arguments))
     except (InvalidInput, MemoryError) as error:
-        little = "there is too little memory; " * isinstance(error, MemoryError)
+        little = (
+            "there is too little memory; " if isinstance(error, MemoryError) else ""
+        )
         sys.stderr.write(f"vdsm: {little}{error}".rstrip("; ") + "\n")
         return 2
     found = f"{outcome.n_intervals} intervals, {outcome.n_claims} clearances"

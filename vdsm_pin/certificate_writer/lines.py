@@ -26,7 +26,17 @@ from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.source import MAX_LINE
 from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
+from vdsm_pin.proof.layouts import (
+    CLAIM,
+    FIRST,
+    LAST,
+    OF_INTERVAL,
+    OF_PAIR,
+    PLANE_NORMAL,
+    RECORD,
+    SLICE_END,
+    SLICE_START,
+)
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Task
@@ -128,7 +138,8 @@ def write_lines(
             length += len(part)
             if length > MAX_LINE:
                 raise CertificateTooLarge(TOO_LONG)
-            length *= not text.endswith("\n")
+            if text.endswith("\n"):
+                length = 0
         last = LastLine(end=True, sha256=digest.hexdigest())
         file.write(last.model_dump_json().encode() + b"\n")
 
@@ -177,7 +188,7 @@ def _lines(proof: Recorded, deadline: Deadline) -> Iterator[str]:
                     f"interval {reached}: the proof of pair {pair} was not found again"
                 )
                 raise VerificationFailed(message)
-            partner = task.pairs.obstacle[records[:count, 1].astype(np.int64)]
+            partner = task.pairs.obstacle[records[:count, OF_PAIR].astype(np.int64)]
             records[:count, LAST] = np.maximum(
                 records[:count, LAST], proof.whole[partner]
             )
@@ -191,17 +202,18 @@ def _interval_lines(
     task: Task, records: FloatArray, first: int, last: int
 ) -> Iterator[str]:
     """The lines of the intervals [first, last), in parts that memory can hold."""
-    order = np.lexsort((records[:, FIRST], records[:, 2], records[:, 1], records[:, 0]))
+    keys = (FIRST, SLICE_START, OF_PAIR, OF_INTERVAL)  # the last one first
+    order = np.lexsort([records[:, key] for key in keys])
     rows, n_pairs = records[order], len(task.pairs.rough)
     for k in range(first, last):
-        low, high = np.searchsorted(rows[:, 0], [k, k + 1])
+        low, high = np.searchsorted(rows[:, OF_INTERVAL], [k, k + 1])
         yield f'{{"k":{k},"proofs":['
         for begin in range(0, n_pairs, PAIRS):
             pairs = range(begin, min(begin + PAIRS, n_pairs))
-            ends = np.searchsorted(rows[low:high, 1], [pairs.start, pairs.stop])
+            ends = np.searchsorted(rows[low:high, OF_PAIR], [pairs.start, pairs.stop])
             proofs = _proofs(task, rows[low:high][slice(*ends)].tolist(), pairs)
             text = json.dumps(proofs, separators=(",", ":"))
-            yield "," * bool(begin) + text[1:-1]
+            yield ("," if begin else "") + text[1:-1]
         yield "]}\n"
 
 
@@ -209,11 +221,12 @@ def _proofs(task: Task, rows: list[list[float]], pairs: range) -> list[list[list
     """Of one interval and each of some pairs its slices, of each slice its planes."""
     proofs: list[list[list[Any]]] = [[] for _ in pairs]
     for row in rows:
-        slices = proofs[pairs.index(int(row[1]))]
-        if not slices or slices[-1][0] != row[2]:
-            slices.append([_short(row[2]), _short(row[3]), []])
+        pair, start, end = int(row[OF_PAIR]), row[SLICE_START], row[SLICE_END]
+        slices = proofs[pairs.index(pair)]
+        if not slices or slices[-1][0] != start:
+            slices.append([_short(start), _short(end), []])
         n = [_short(x) for x in row[PLANE_NORMAL:CLAIM]]
-        lower = _counted(row[CLAIM], float(task.pairs.required[int(row[1])]))
+        lower = _counted(row[CLAIM], float(task.pairs.required[pair]))
         slices[-1][2].append([int(row[FIRST]), int(row[LAST]), *n, lower])
     return proofs
 

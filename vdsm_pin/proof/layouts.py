@@ -51,6 +51,10 @@ TALLY: Final = 4
 """Layout of what is counted: candidates held, slices tried, planes found, candidates
 that found no room."""
 
+OF_INTERVAL: Final = 0
+OF_PAIR: Final = 1
+SLICE_START: Final = 2
+SLICE_END: Final = 3
 FIRST: Final = 4
 LAST: Final = 5
 PLANE_NORMAL: Final = 6

@@ -16,9 +16,13 @@ from vdsm_pin.proof.layouts import (
     INTERVAL,
     KEY,
     LAST,
+    OF_INTERVAL,
+    OF_PAIR,
     PAIR,
     PLANE_NORMAL,
     SLICE,
+    SLICE_END,
+    SLICE_START,
     START,
 )
 from vdsm_pin.proof.motions import Motion
@@ -97,7 +101,8 @@ def _write(
     start = task.pieces.first_piece[task.pairs.obstacle[pair]]
     first, last = task.pieces.node_range[node]
     out = records[count]
-    out[0], out[1], out[2], out[3] = row[INTERVAL], pair, row[START], row[END]
+    out[OF_INTERVAL], out[OF_PAIR] = row[INTERVAL], pair
+    out[SLICE_START], out[SLICE_END] = row[START], row[END]
     out[FIRST], out[LAST] = first - start, last - start
     out[PLANE_NORMAL:CLAIM] = n
     out[CLAIM] = claim
