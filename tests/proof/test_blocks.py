@@ -29,7 +29,7 @@ from vdsm_pin.proof.plane_bounds import (
 )
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import dense_rows
-from vdsm_pin.proof.results import own_up
+from vdsm_pin.proof.results import count_the_rest
 from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, UNDECIDED, Rules, Task, mover_of
@@ -410,7 +410,7 @@ def test_each_pair_owns_up_to_what_it_was_not_judged(judged: tuple[int, int]) ->
     results.counts[:, CERTIFIED] = judged
     results.best[:, 0] = 1.0
     results.profile[:] = 1.0
-    own_up(results, BLOCK)
+    count_the_rest(results, BLOCK)
     left = BLOCK - np.array(judged)
     np.testing.assert_array_equal(results.counts[:, UNDECIDED], left)
     assert (results.best[left > 0, 0] == -np.inf).all()

@@ -12,7 +12,7 @@ from vdsm_pin.proof.least_bracket import narrow
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.plane_bounds import bound_above, bound_below
-from vdsm_pin.proof.results import Results, note_block, note_upper, own_up
+from vdsm_pin.proof.results import Results, count_the_rest, note_block, note_upper
 from vdsm_pin.proof.row_places import fill_rows, seen
 from vdsm_pin.proof.rows import BLOCK, TURNED
 from vdsm_pin.proof.terms import ACROSS, CERTIFIED, WITHIN, Task
@@ -180,7 +180,7 @@ def judge(
     broad = borrowed(broad)
     in_time = _sweep(task, motion, work, results, broad, span, False)
     merge_far(task, motion, work.ends, results, broad)
-    own_up(results, span[1] - span[0])
+    count_the_rest(results, span[1] - span[0])
     if in_time and narrowing:
         narrow(task, motion, work, results, ACROSS)
         narrow(task, motion, work, results, WITHIN)

@@ -50,8 +50,8 @@ def served(
         lower: Lower bounds, shape (count,); [m].
         upper: Upper bounds, shape (count,); [m].
         bar: A lower bound below it does not serve; [m].
-        slack: A bracket may be as wide as this part of the clearance, and wider
-        width: by so much; [m].
+        slack: Nor does a bracket wider than this part of its upper bound and
+        width: this in sum; [m].
     """
     missed = 0
     for r in range(lower.size):

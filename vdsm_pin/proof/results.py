@@ -210,8 +210,8 @@ def note_block(
 
 
 @compiled
-def own_up(results: Results, n_intervals: int) -> None:
-    """Call undecided what the time did not allow to judge of so many intervals."""
+def count_the_rest(results: Results, n_intervals: int) -> None:
+    """Count as undecided what the time did not allow to judge of n_intervals."""
     apart()
     for pair in range(results.counts.shape[0]):
         counts = results.counts[pair]

@@ -175,7 +175,8 @@ def _bound_towards(
 def examine(slicing: Slicing, row: FloatArray, t: float, witness: Witness) -> None:
     """Look at one instant of a slice's interval; keeps the least upper bound.
 
-    It is as low as can be where that is news: below the least one known.
+    Where that may fall below the least one known it is found as closely as can be, else
+    a rough version of the pair may do.
     """
     apart()
     task, space = slicing.task, slicing.space

@@ -122,7 +122,8 @@ def leaf_bracket(
         space: Its `body` is loaded.
         p: Number of the piece.
         goal: Width of the bracket at which to stop.
-        sighted: Whether witnesses are wanted where errors grow the body.
+        sighted: Whether witness points are needed although errors grow the body: they
+            are found by a second bracket, of the body that is not grown.
         out: Guess of n on entry. On return `lower` and n are of the best plane; `upper`
             and the witnesses are of the hull of the points alone, inf where not wanted.
     """

@@ -81,9 +81,10 @@ class Places(NamedTuple):
 class Pairs(NamedTuple):
     """All pairs, in the order of the certificate, then rough versions of some.
 
-    A rough version of a pair is of bodies that lie within its own and span them but for
-    a distance: less that, what is proved of it is proved of the pair, and what it comes
-    to at most the pair does too.
+    A rough version has fewer corners: its bodies lie within those of the pair, and no
+    point of these is farther than a distance `loose` from them, in sum of both. So the
+    pair's clearance is at least a lower bound of the rough version less `loose`, and at
+    most its upper bound.
 
     Args:
         rough: The rows of each pair's rough versions, the roughest first, -1 for none,
