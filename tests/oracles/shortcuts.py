@@ -14,7 +14,7 @@ from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene_with_files
-from vdsm_pin.robots.trajectory_files import path_of, read_motion
+from vdsm_pin.robots.trajectory_files import joint_path, read_motion
 
 
 def start_proof(
@@ -38,4 +38,4 @@ def read_scene(path: File, robot_size: float) -> Scene:
 
 def read_path(file: File, robot: Robot, topic: str | None = None) -> Path:
     """A trajectory as the controller of a robot runs it."""
-    return path_of(file, read_motion(file, robot.joints, topic, robot.values))
+    return joint_path(file, read_motion(file, robot.joints, topic, robot.values))

@@ -17,7 +17,7 @@ from vdsm_pin.report.tables import ClearanceCsv
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.robots.trajectory_csv import csv_text
-from vdsm_pin.robots.trajectory_files import moved, path_of, read_motion
+from vdsm_pin.robots.trajectory_files import joint_path, moved, read_motion
 
 if TYPE_CHECKING:  # few need repair or a certificate
     from vdsm_pin.certificate_writer.lines import Hashes
@@ -43,7 +43,7 @@ class RobotSubject:
         """Read the motion of a file."""
         robot = self.problem.robot
         motion = read_motion(file, robot.joints, self.options.topic, robot.values)
-        path_of(file, motion)
+        joint_path(file, motion)
         check_times(file, self.problem.scene, motion)
         return motion
 
@@ -62,7 +62,7 @@ class RobotSubject:
         robot = self.problem.robot
         given = expect(motion, JointTrajectory, "read_trajectory(path, problem)")
         found = moved(given, robot.joints, robot.values, NO_FILE)
-        path_of(NO_FILE, found)
+        joint_path(NO_FILE, found)
         return found
 
     def judge(

@@ -14,7 +14,7 @@ from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.files import HULLS, files_of_robot
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.trajectory_files import path_of, read_motion
+from vdsm_pin.robots.trajectory_files import joint_path, read_motion
 from vdsm_pin.robots.urdf import read_robot
 
 
@@ -27,7 +27,7 @@ def read_other(one: OtherFile) -> Others:
     files = files_of_robot(one.model, one.folder)
     robot = read_robot(files)
     motion = read_motion(one.trajectory, robot.joints, one.topic, robot.values)
-    path = path_of(one.trajectory, motion)
+    path = joint_path(one.trajectory, motion)
     base, *joints = robot.tree.joints
     tree = Tree((replace(base, placement=one.pose), *joints))
     said = (*robot.notes, *(f"trajectory: {note}" for note in motion.notes))

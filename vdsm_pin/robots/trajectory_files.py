@@ -138,7 +138,7 @@ def _long_ways(q: FloatArray, joints: Sequence[RobotJoint]) -> Iterator[str]:
             )
 
 
-def path_of(file: File, motion: JointTrajectory) -> "Path":
+def joint_path(file: File, motion: JointTrajectory) -> "Path":
     """The pieces through some waypoints.
 
     Raises:

@@ -14,7 +14,7 @@ from vdsm_pin.geometry.solids import Box
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explain import how_far, minimal, refuse
-from vdsm_pin.planner.fewest.explore import Outcome, explore
+from vdsm_pin.planner.fewest.explore import Explored, explore
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Effort, Insert
 from vdsm_pin.planner.fewest.motion import Corners
@@ -117,7 +117,7 @@ def test_a_stop_is_told_with_the_station_where_it_was() -> None:
     corners = Corners(np.zeros((0, 3)), still, np.zeros(0), proof.far[:0], ENDS)
     found = Found(route, corners, (len(route.layers) - 1,))
     judge = Judge(task, clearance, 0.0, 0.0, 1e-3)
-    told = how_far(task, Outcome(judge, found, rows, proof), Deadline(1.0, 0.0))
+    told = how_far(task, Explored(judge, found, rows, proof), Deadline(1.0, 0.0))
     assert told.station == route.stations[-2] > 0.0
     at = in_mm(told.station)
     assert told.words.startswith(

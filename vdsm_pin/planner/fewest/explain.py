@@ -16,7 +16,7 @@ from vdsm_pin.errors import (
 )
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
-from vdsm_pin.planner.fewest.explore import Outcome
+from vdsm_pin.planner.fewest.explore import Explored
 from vdsm_pin.planner.fewest.motion import Corners, standing
 from vdsm_pin.planner.fewest.narrow_passage import Passage, narrowest_passage
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
@@ -50,7 +50,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import at_most_mm, in_mm
 
 
-def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
+def refuse_proved(problem: PlanningProblem, outcome: Explored) -> None:
     """Raise where it is proved that nothing of the path can be drawn.
 
     Where the problem allows no detour, something that cannot be drawn is enough. A
@@ -76,7 +76,7 @@ def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
         raise NoPlanFound(message)
 
 
-def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
+def refuse(problem: PlanningProblem, outcome: Explored) -> None:
     """Raise where no motion was found, or none that draws the whole path; no proof.
 
     Less will do where the problem allows detours.
@@ -92,7 +92,7 @@ def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
         raise NoPlanFound(str(reached), reached)
 
 
-def _drawn(problem: PlanningProblem, outcome: Outcome) -> float:
+def _drawn(problem: PlanningProblem, outcome: Explored) -> float:
     """Length of the path that the motion found draws; [m]."""
     if outcome.found is None:
         return 0.0
@@ -102,7 +102,7 @@ def _drawn(problem: PlanningProblem, outcome: Outcome) -> float:
     return problem.path.length - undrawn
 
 
-def _proved(problem: PlanningProblem, outcome: Outcome) -> Infeasible:
+def _proved(problem: PlanningProblem, outcome: Explored) -> Infeasible:
     rows, proof = outcome.rows, outcome.proof
     if proof.far.any():
         return _out_of_reach(problem, rows)
@@ -148,7 +148,7 @@ def _out_of_reach(problem: PlanningProblem, rows: PathRows) -> OutOfReach:
     )
 
 
-def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
+def say_drawn(problem: PlanningProblem, outcome: Explored) -> None:
     """Say how much of the path can be drawn by now, and how far the tip comes on it."""
     if outcome.found is None:
         return
@@ -166,7 +166,7 @@ def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
     )  # fmt: skip
 
 
-def how_far(problem: PlanningProblem, outcome: Outcome, deadline: Deadline) -> Reached:
+def how_far(problem: PlanningProblem, outcome: Explored, deadline: Deadline) -> Reached:
     """Where the search came to an end, what stopped it, what to try; not a proof.
 
     Args:
@@ -236,7 +236,7 @@ def _on_the_way(
 def notes_of(
     problem: PlanningProblem,
     clearance: LinkClearance,
-    outcome: Outcome,
+    outcome: Explored,
     trajectory: Trajectory,
     centres: FloatArray,
 ) -> tuple[str, ...]:
@@ -315,7 +315,7 @@ def _farthest_back(
     return worst
 
 
-def _order(outcome: Outcome) -> list[str]:
+def _order(outcome: Explored) -> list[str]:
     """In which order and directions the pieces are drawn, where it is not as given."""
     assert outcome.found is not None
     ends = _pieces(outcome.found.corners)
@@ -341,7 +341,7 @@ def _pieces(corners: Corners) -> list[tuple[float, float]]:
     return pieces
 
 
-def undrawn(problem: PlanningProblem, outcome: Outcome) -> tuple[str, ...]:
+def undrawn(problem: PlanningProblem, outcome: Explored) -> tuple[str, ...]:
     """Each stretch that is not drawn, and why."""
     assert outcome.found is not None
     route = outcome.found.route
@@ -362,7 +362,7 @@ def undrawn(problem: PlanningProblem, outcome: Outcome) -> tuple[str, ...]:
 
 
 def _why_undrawable(
-    problem: PlanningProblem, outcome: Outcome, start: float, stop: float
+    problem: PlanningProblem, outcome: Explored, start: float, stop: float
 ) -> str:
     """Why nobody can draw some of the path between two stations, in words."""
     rows, proof = outcome.rows, outcome.proof

@@ -60,7 +60,7 @@ LOG: Final = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Explored:
     """What the exploration came to.
 
     Args:
@@ -103,7 +103,7 @@ def explore(
     weights: CostWeights,
     effort: Effort = FULL,
     soon: Deadline = NO_LIMIT,
-) -> Iterator[Outcome]:
+) -> Iterator[Explored]:
     """Search level by level until all that can be drawn is drawn.
 
     Args:
@@ -128,7 +128,7 @@ def explore(
         problem, clearance, margin, first.slack * length, first.finest * length
     )
     proof = prove_tips(held_from(problem, TIP_ONLY), clearance, rows.tips)
-    best = Outcome(judge, None, rows, proof)
+    best = Explored(judge, None, rows, proof)
     yield best
     if best.proof.undrawable.all():
         return
@@ -153,14 +153,14 @@ def explore(
             problem, clearance, margin, level.slack * length, level.finest * length,
             ease, clearance.up_to(worth), kept,
         )  # fmt: skip
-        now = Outcome(judge, None, rows, proof, stuck)
+        now = Explored(judge, None, rows, proof, stuck)
         try:
             if isinstance(level, Insert):
                 now = _inserted(now, spaces.of(level), level, soon)
                 stuck = now.stuck
             elif isinstance(level, Search):
                 found, confined = _look(judge, level, rows, proof, weights)
-                now = Outcome(judge, found, rows, proof, stuck)
+                now = Explored(judge, found, rows, proof, stuck)
         except NoWayOut as error:
             no_way_out = error
         LOG.debug("%s: %.4f m missing", level, now.missing)
@@ -222,7 +222,7 @@ class _Spaces:
         return None if first is None else self.of(first)
 
 
-def _leads_there(space: TipSpace, outcome: Outcome) -> bool:
+def _leads_there(space: TipSpace, outcome: Explored) -> bool:
     """Whether ways of the tip lead to all stretches that are not drawn."""
     open_, tips = ~outcome.proof.undrawable, outcome.rows.tips
     # From one row to the next the path itself leads, unless a wall is between them.
@@ -233,8 +233,8 @@ def _leads_there(space: TipSpace, outcome: Outcome) -> bool:
 
 
 def _inserted(
-    before: Outcome, space: TipSpace, level: Insert, soon: Deadline
-) -> Outcome:
+    before: Explored, space: TipSpace, level: Insert, soon: Deadline
+) -> Explored:
     """What an insertion comes to; into a closed path from another place too.
 
     Where it is entered farther on and drawn to its end, that place is the one to begin
@@ -268,8 +268,8 @@ def _inserted(
 
 
 def _once_inserted(
-    before: Outcome, space: TipSpace, level: Insert, soon: Deadline
-) -> Outcome:
+    before: Explored, space: TipSpace, level: Insert, soon: Deadline
+) -> Explored:
     undrawable = before.proof.undrawable
     now = insert(before.judge, space, before.rows, undrawable, level, soon)
     return replace(before, found=now.found, stuck=now.stuck or before.stuck)
@@ -278,9 +278,9 @@ def _once_inserted(
 def _cut_off(
     problem: PlanningProblem,
     clearance: BroadPhase,
-    outcome: Outcome,
+    outcome: Explored,
     space: TipSpace | None,
-) -> Outcome:
+) -> Explored:
     """The outcome with rows that no way of the tip is proved to lead to.
 
     Where ways of the tip to all of them are soon found, there are none.
@@ -293,8 +293,8 @@ def _cut_off(
 
 
 def _hemmed_in(
-    problem: PlanningProblem, clearance: BroadPhase, outcome: Outcome
-) -> Outcome:
+    problem: PlanningProblem, clearance: BroadPhase, outcome: Explored
+) -> Explored:
     """The outcome with rows not drawn where the last link is proved to have no room."""
     tips, proof = outcome.rows.tips, outcome.proof
     open_ = np.flatnonzero(~(outcome.drawn | proof.undrawable))

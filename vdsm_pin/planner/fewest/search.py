@@ -10,7 +10,7 @@ from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.route import TipRoute
-from vdsm_pin.planner.fewest.sequence import Planner, Sequence, reordered
+from vdsm_pin.planner.fewest.sequence import Sequence, SequenceSearch, reordered
 from vdsm_pin.problem.desired_path import Order
 
 
@@ -68,14 +68,14 @@ def search(
         None if the rounds end or nothing is drawn.
     """
     arm = judge.problem.manipulator
-    planner = Planner(roadmap, arm.total_length, start_node)
+    sequences = SequenceSearch(roadmap, arm.total_length, start_node)
     known: set[tuple[int, int]] = set()
     for _ in range(rounds):
-        sequence = planner.sequence()
+        sequence = sequences.sequence()
         if not any(leg.drawn for leg in sequence.legs):
             return None
         if judge.problem.path.order is Order.FREE:
-            sequence = reordered(planner, sequence)
+            sequence = reordered(sequences, sequence)
         corners = _corners(arm, roadmap, sequence)
         fresh = _fresh(corners.edges, known)
         good = (
@@ -85,10 +85,10 @@ def search(
         if not bad.size:
             return Searched(
                 roadmap.route, corners, sequence.skipped, roadmap, start_node,
-                planner.from_start,
+                sequences.from_start,
             )  # fmt: skip
         known.update(_keys(corners.edges[fresh]))
-        planner.block(corners.edges[bad], not corners.drawn[bad].all())
+        sequences.block(corners.edges[bad], not corners.drawn[bad].all())
     return None
 
 

@@ -63,7 +63,7 @@ class Sequence:
     skipped: tuple[int, ...]
 
 
-class Planner:
+class SequenceSearch:
     """Sequences over one roadmap while edges get blocked.
 
     Args:
@@ -197,11 +197,11 @@ def backwards(leg: Leg) -> Leg:
     return Leg(leg.drawn, leg.nodes[::-1], leg.layers[::-1])
 
 
-def reordered(planner: Planner, sequence: Sequence) -> Sequence:
+def reordered(ways: SequenceSearch, sequence: Sequence) -> Sequence:
     """The same pieces in the order and directions with the shortest ways between.
 
     Args:
-        planner: Knows the ways.
+        ways: Knows the connections.
         sequence: The path in the order given.
 
     Returns:
@@ -211,9 +211,9 @@ def reordered(planner: Planner, sequence: Sequence) -> Sequence:
     if not 1 <= len(runs) <= MOST_PIECES:
         return sequence
     entry = np.array([[run.nodes[0], run.nodes[-1]] for run in runs])
-    first = planner.from_start[entry]
+    first = ways.from_start[entry]
     between = np.stack(
-        [[planner.lengths_from(int(node))[0][entry] for node in pair] for pair in entry]
+        [[ways.lengths_from(int(node))[0][entry] for node in pair] for pair in entry]
     )
     order = shortest_tour(first, between)
     given = tuple((number, False) for number in range(len(runs)))
@@ -221,7 +221,7 @@ def reordered(planner: Planner, sequence: Sequence) -> Sequence:
     if not gain > 0.0:
         return sequence
     chosen = [backwards(runs[k]) if back else runs[k] for k, back in order]
-    return planner.joined(chosen, sequence.skipped)
+    return ways.joined(chosen, sequence.skipped)
 
 
 def tour_length(

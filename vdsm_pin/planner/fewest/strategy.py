@@ -18,7 +18,7 @@ from vdsm_pin.planner.fewest.explain import (
     say_drawn,
     undrawn,
 )
-from vdsm_pin.planner.fewest.explore import Outcome, explore
+from vdsm_pin.planner.fewest.explore import Explored, explore
 from vdsm_pin.planner.fewest.joint_error import levers
 from vdsm_pin.planner.fewest.judge import check_cone
 from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort, pointed
@@ -174,7 +174,7 @@ class _Search:
         quick = quick.up_to(quick.far + most)
         early = replace(quick, deadline=_early(quick.deadline))
         soon = _soon(problem, quick.deadline)
-        best: Outcome | None = None
+        best: Explored | None = None
         try:
             for outcome in explore(
                 problem, early, self.margin, self.weights, effort, soon
@@ -189,7 +189,7 @@ class _Search:
             reached = "" if best is None else how_far(problem, best, quick.deadline)
             raise OutOfTime(ended.limit, reached) from None
 
-    def _written(self, clearance: BroadPhase, outcome: Outcome) -> Plan:
+    def _written(self, clearance: BroadPhase, outcome: Explored) -> Plan:
         """What was found, smoothed and row by row."""
         assert outcome.found is not None
         problem, weights, judge = self.problem, self.weights, outcome.judge
