@@ -19,7 +19,7 @@ from vdsm_pin.batch.run import OWN, Batch, run_batch, seconds_of
 from vdsm_pin.batch.task import MANIFEST, TIMING, Settings, Task
 from vdsm_pin.batch.worker import perform
 from vdsm_pin.cli import main
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.errors import InvalidFile, OutOfTime
 
 PROBLEM = """\
 vdsm_problem: 1
@@ -167,6 +167,33 @@ def test_a_trajectory_that_changes_meanwhile_gets_no_result(
     assert "motion.csv: changed while it was worked on" in capsys.readouterr().err
     assert not any((here / "out").iterdir())
     assert not (here / "proof").exists()
+
+
+def test_results_that_stay_are_called_those_of_an_earlier_run(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a plan and of a verification that come to nothing."""
+    text = (here / "problem.yaml").read_text()
+    assert run("plan", "problem.yaml", "--out", "out") == 0
+    verify = ["verify", "problem.yaml", "--trajectory", "motion.csv", "--out", "out"]
+    assert run(*verify) == 0
+    before = (here / "out" / "plan.json").read_bytes()
+    (here / "problem.yaml").write_text(
+        text.replace("[2.01, 0, 0]]", "[9, 9, 0]], blocked: fail")
+    )
+    capsys.readouterr()
+    assert run("plan", "problem.yaml", "--out", "new") == 1
+    assert "earlier run" not in capsys.readouterr().err
+    assert run("plan", "problem.yaml", "--out", "out") == 1
+    assert "out/plan.json is of an earlier run" in capsys.readouterr().err
+    assert (here / "out" / "plan.json").read_bytes() == before
+
+    def late(*_: object, **__: object) -> object:
+        raise OutOfTime(1.0)
+
+    monkeypatch.setattr("vdsm_pin.app.arm_subject.verify", late)
+    assert run(*verify) == 1
+    assert "out/verification.json is of an earlier run" in capsys.readouterr().err
 
 
 def test_two_outputs_do_not_share_a_place(

@@ -12,7 +12,13 @@ from pydantic import ValidationError
 from vdsm_pin.app.arm_subject import CABLES, CENTRES, LINK_ANGLES
 from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions
 from vdsm_pin.app.subjects import ProblemOrCell, Subject, subject_of
-from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime, VerificationFailed
+from vdsm_pin.errors import (
+    Infeasible,
+    InvalidFile,
+    OutOfTime,
+    VdsmError,
+    VerificationFailed,
+)
 from vdsm_pin.io.source import (
     check_is_file_or_bag,
     check_unchanged,
@@ -146,6 +152,7 @@ def plan_to_folder(
         with staged(folder) as staging:
             write_no_plan(staging / NO_PLAN, problem, error, strategy, record)
         error.page = folder / NO_PLAN
+        _name_earlier(error, folder / PLAN)
         raise
     plan = refinement.plan
     with staged(folder) as staging:
@@ -188,11 +195,21 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     """
     _check_outputs(order)
     given = read_given(order)
-    with staged(order.folder) as staging:
-        verified = verify_into(order, given, staging)
+    try:
+        with staged(order.folder) as staging:
+            verified = verify_into(order, given, staging)
+    except (OutOfTime, VerificationFailed) as error:
+        _name_earlier(error, order.folder / VERIFICATION)
+        raise
     if order.pdf is not None:
         print_page(order.folder / REPORT, order.pdf)
     return verified
+
+
+def _name_earlier(error: VdsmError, result: Path) -> None:
+    """Have an error say that a result is of an earlier run, where there is one."""
+    if result.exists():
+        error.more += (f"{result} is of an earlier run",)
 
 
 class Given(NamedTuple):
