@@ -219,7 +219,7 @@ def test_architecture_says_who_calls_whom() -> None:
     """Every name is there, and the module that a caller stands in speaks of it."""
     text = (PACKAGE.parent / "ARCHITECTURE.md").read_text(encoding="utf-8")
     above: dict[int, Path] = {}
-    for line in text.split("```\n")[1].splitlines():
+    for line in text.split("```")[1].removeprefix("text\n").splitlines():
         if dotted := line.split()[:1]:
             depth = len(line) - len(line.lstrip())
             path, name = defined(*dotted)
