@@ -242,7 +242,7 @@ def check_coal(
         arm.near(trajectory, room, travel, deadline), arm.spread(trajectory, deadline)
     )
     for found in chain(log.answers(arm, trajectory), _kept(rows, arm, proved, log)):
-        # Of a link whose hull is flat Coal says nothing; elsewhere it has to agree.
+        # A distance is NaN for a flat hull, which Coal cannot take: not compared.
         silent, excess = np.isnan(found.distance), found.disagreement
         excess[np.isnan(excess)] = np.inf
         excess[silent] = -np.inf

@@ -110,7 +110,7 @@ def _as_seen_from(
 
 
 def _middle(piece: Piece) -> tuple[FloatArray, float]:
-    """A point of a convex part of a body, and how far off its skin it lies; [m]."""
+    """A point of a convex part of a body, and how far from its surface that is; [m]."""
     if isinstance(piece, FlatCylinder):
         return piece.centre, 0.0
     assert isinstance(piece, Hull)  # nothing that moves is a half-space

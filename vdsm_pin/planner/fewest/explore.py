@@ -45,9 +45,9 @@ from vdsm_pin.tolerances import TOLERANCES
 SPREAD: Final = 0.381966
 """Part of a closed path by which places to enter it are apart (golden section); [-]."""
 
-STEP: Final = 0.08
+DIRECTION_STEP: Final = 0.08
 """Lattice step of the directions of shapes; [-]."""
-PLACES: Final = 8
+KNEE_JOINTS: Final = 8
 """Largest number of joints at which a knee is tried."""
 
 FEW_CELLS: Final = 16_000
@@ -317,7 +317,7 @@ def _look(
     arm = problem.manipulator
     length = arm.total_length
     coarse, back = level.coarse * length, level.back * length
-    shapes = one_knee_shapes(arm, judge.limit, STEP, PLACES)
+    shapes = one_knee_shapes(arm, judge.limit, DIRECTION_STEP, KNEE_JOINTS)
     route = tip_route(problem, rows, proof.undrawable, coarse, back)
     roadmap = build_roadmap(judge, weights, route, shapes, level.around)
     roadmap, start_node = with_start(judge, roadmap, weights)

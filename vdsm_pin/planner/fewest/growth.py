@@ -28,7 +28,7 @@ OFFSPRING: Final = 8
 MUTATIONS: Final = 4
 """Times a population that dwindles is mutated at rest before it goes back."""
 ENOUGH: Final = 0.5
-"""Room beyond this part of the body's radius is worth nothing more; [-]."""
+"""Clearance beyond this part of the body's radius scores no better; [-]."""
 UNCHANGED: Final = 0.3
 """Part of the children that follow the leader that are not mutated besides; [-]."""
 AIMED: Final = 0.5

@@ -25,8 +25,8 @@ CUTS: Final = 16
 """Times an interval is cut; the body moves 65,536 times less in what is left then."""
 NEAR_LIMIT: Final = 0.9
 """An interval is looked at for its link angles if an end has so much of the largest."""
-PLACES: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
-"""Places of an interval at which it is seen where the last link looks; [-]."""
+AIM_SHARES: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+"""Parts of an interval at which it is seen where the last link looks; [-]."""
 STEPS: Final = tuple(0.5 ** (2 + k) for k in range(10))
 """Steps to the place of an interval where a link bends most, one after the other; [-].
 """
@@ -105,7 +105,8 @@ class Judge:
         finest: Way of the body below which an interval between two clear
             configurations counts as clear; [m].
         ease: Part of the largest link angle that may be used; [-].
-        rough: For single configurations, where less exactness will do; None: the same.
+        rough: A cheaper clearance function, for single configurations; None for the
+            same one.
         kept: What each link keeps besides, shape (N,); None for nothing; [m].
     """
 
@@ -354,7 +355,7 @@ class Judge:
         asked = np.flatnonzero(np.isfinite(intervals.aims).all(axis=(1, 2)))
         begin, end = intervals.aims[asked, 0], intervals.aims[asked, 1]
         arm = self.problem.manipulator
-        for share in PLACES if asked.size else ():
+        for share in AIM_SHARES if asked.size else ():
             inner = intervals.centres(arm, asked, np.full(len(asked), share))
             kept[asked] &= self._aimed(inner, (1.0 - share) * begin + share * end)
         return kept

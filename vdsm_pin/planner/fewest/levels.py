@@ -61,7 +61,7 @@ class Insert(Level):
         seed: Of the source of chance.
         led: Part of the children that follow the leader. They bend more joints, and
             come through where nobody else does; [-].
-        cells: Cells at which the search for a way of the tip ends.
+        cells: Most cells that a search for a way of the tip makes.
         directed: Whether arms are described by the directions of their links, which may
             lean backwards then, and not by their projections.
     """

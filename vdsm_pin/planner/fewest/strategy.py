@@ -43,12 +43,12 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
-SEARCHED: Final = 0.6
+SEARCH_SHARE: Final = 0.6
 """Part of the time after which a search ends that has found something; [-]."""
-TOLD: Final = 0.1
+EXPLAIN_SHARE: Final = 0.1
 """Part of the time that is left to tell what stopped a search; [-]."""
-LAST: Final = 4.0
-"""The largest; [s]."""
+EXPLAIN_MOST: Final = 4.0
+"""The longest time left for that; [s]."""
 FEWEST: Final = CostWeights()
 CLEAREST: Final = CostWeights(angle=0.2, clearance=0.064, clearance_cost=8.0)
 
@@ -260,14 +260,14 @@ class _Search:
 
 def _early(deadline: Deadline) -> Deadline:
     """When the search ends, so that there is time to tell what stopped it."""
-    return deadline.earlier(min(LAST, TOLD * deadline.limit))
+    return deadline.earlier(min(EXPLAIN_MOST, EXPLAIN_SHARE * deadline.limit))
 
 
 def _soon(problem: PlanningProblem, deadline: Deadline) -> Deadline:
     """From when on a part of the path will do, so that its proof is in time."""
     if problem.path.blocked is Blocked.FAIL or deadline.end == np.inf:
         return NO_LIMIT
-    return deadline.earlier((1.0 - SEARCHED) * deadline.left)
+    return deadline.earlier((1.0 - SEARCH_SHARE) * deadline.left)
 
 
 def _stations(corners: Corners, rows: Rows) -> tuple[FloatArray, BoolArray]:
