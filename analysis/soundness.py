@@ -48,6 +48,7 @@ from oracles.adversarial_truth import exact_bracket
 from oracles.tree_queries import at as tree_rows
 from oracles.tree_queries import clearances, make_query, random_box, wrong_poses
 
+import vdsm_pin
 from vdsm_pin.arm.bodies import arm_bodies
 from vdsm_pin.arm.kinematics import arm_tree, link_frame
 from vdsm_pin.geometry.convex import Hull
@@ -427,8 +428,9 @@ def report(tally: Counter[str], command: str) -> str:
     """The page: what was asked, what came of it, where and with what."""
     share = tally["undecided far"] / max(1, tally["far"])
     each = tally["cpu_us"] / max(1, tally["queries"])
-    packages = ("vdsm-pin", "numpy", "numba", "python-flint")
-    versions = ", ".join(f"{name} {version(name)}" for name in packages)
+    packages = [(name, version(name)) for name in ("numpy", "numba", "python-flint")]
+    known = [("vdsm-pin", vdsm_pin.__version__), *packages]
+    versions = ", ".join(f"{name} {number}" for name, number in known)
     lines = [
         "# Soundness",
         "",
