@@ -32,6 +32,7 @@ def widest(
     low: float,
     high: float,
     rounds: int = ROUNDS,
+    until: float = 0.0,
 ) -> tuple[list[Plan], float]:
     """Plans with more and more in reserve that draw as much as the first one.
 
@@ -41,13 +42,14 @@ def widest(
         low: A reserve it has.
         high: A reserve that nothing has.
         rounds: Most halvings.
+        until: Width of what is left at which to stop.
 
     Returns:
         The plans, the first one included, and the reserve of the last.
     """
     plans, whole = [first], drawn_length(first) - TOLERANCES.joint_centre
     for _ in range(rounds):
-        if not low < high < np.inf:
+        if not until < high - low < np.inf:
             break
         middle = (low + high) / 2.0
         try:

@@ -13,8 +13,10 @@ from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
-ROUNDS: Final = 10
-"""Halvings; the last tells the reserve to 1/1024 of where it was sought."""
+RESOLUTION: Final = 5e-5
+"""To what the reserve is told; [m]."""
+ROUNDS: Final = 20
+"""Most halvings: as many as 50 m need."""
 
 
 def plan_paper_clearest(
@@ -36,6 +38,7 @@ def plan_paper_clearest(
         max(low, 0.0),
         high,
         rounds=ROUNDS,
+        until=RESOLUTION,
     )
     notes = (*plans[-1].notes, told(kept + reserve))
     return replace(plans[-1], strategy=name, notes=notes)
