@@ -25,7 +25,7 @@ from typing import Final
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import yaml
-from result_files import REPORTS, table_lines, write_table
+from result_files import REPORTS, at_least, table_lines, write_table
 
 from benchmarks.hrm1000.families import FAMILIES
 from benchmarks.hrm1000.generate import generate
@@ -123,10 +123,12 @@ def sample(per_family: int, folder: Path, minutes: float) -> Iterator[Line]:
             yield line(f"{family}-{number:04d}", found)
 
 
+PROVED: Final = "proved"
+"""In place of the form of a number: rounded down, to a tenth."""
 MEASURED: Final = {
     "ψ max [°]": ("psi_deg", ".1f"),
     "changed angles, mean": ("changed", ".2f"),
-    "clearance [mm]": ("clearance_mm", ".1f"),
+    "clearance [mm]": ("clearance_mm", PROVED),
     "time [s]": ("seconds", ".2f"),
 }
 """Columns of numbers, with what stands in them."""
@@ -158,7 +160,10 @@ def numbers(one: Line) -> list[str]:
 
 def cell(value: float | None, form: str) -> str:
     """A number, or a dash."""
-    return "–" if value is None else format(value, form).replace("-", "−")
+    if value is None:
+        return "–"
+    text = at_least(value, 1) if form == PROVED else format(value, form)
+    return text.replace("-", "−")
 
 
 def markdown(lines: list[Line], sampled: list[Line]) -> str:

@@ -20,7 +20,7 @@ from unittest.mock import patch
 import numpy as np
 from paper_figures.runs import SCENES, Run, Runs
 from paper_table import touching_error
-from result_files import table_lines
+from result_files import at_least, at_most, table_lines
 
 from benchmarks.hrm1000.families import FAMILIES
 from benchmarks.hrm1000.generate import VERSION, generate
@@ -32,9 +32,9 @@ from vdsm_pin.planner.paper import joint_paths, pipeline
 from vdsm_pin.planner.paper.online import OnlineRule
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.report import words
 from vdsm_pin.report.motion_facts import changed_angles, motion_facts
-from vdsm_pin.report.words import at_least
-from vdsm_pin.units import MM_PER_M, quantity
+from vdsm_pin.units import percent, quantity
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
@@ -72,7 +72,7 @@ def solvable(runs: Runs) -> Claim:
     for scene in SCENES:
         run = runs(scene, "paper")
         assert run.verification.verdict in (Verdict.CERTIFIED, Verdict.INCOMPLETE)
-        drawn.append(f"{scene} {100.0 * run.verification.coverage:.1f} %")
+        drawn.append(f"{scene} {percent(run.verification.coverage)}")
     return Claim(
         "solvable (1)", "holds in its scenes",
         f"proved motions in all; drawn: {', '.join(drawn)}",
@@ -90,9 +90,10 @@ def real_time(times: dict[str, FloatArray]) -> Claim:
         "real-time (1)",
         "holds on a core of its own" if own <= ALLOWED_US else "does not hold",
         "one `step(tip)` to 17 joint values and 24 cable lengths: median "
-        f"{median:.0f} µs ({1e3 / median:.0f} kHz); in 999 of 1,000 calls of the "
-        f"slowest scene ({slowest}) at most {own:.0f} µs of processor time, "
-        f"{wall:.0f} µs by the clock with other work beside; {len(every):,} calls",
+        f"{at_most(median)} µs ({at_least(1e3 / median)} kHz); in 999 of 1,000 calls "
+        f"of the slowest scene ({slowest}) at most {at_most(own)} µs of processor "
+        f"time, {at_most(wall)} µs by the clock with other work beside; "
+        f"{len(every):,} calls",
         "`planner.paper.online.OnlineRule`",
     )
 
@@ -141,10 +142,10 @@ def avoidance(runs: Runs) -> tuple[Claim, Claim]:
     box = ErrorBox(joint=float(np.deg2rad(EXPERIMENT_DEG)))
     for scene in BLOCKED:
         run = runs(scene, "paper")
-        kept.append(f"{scene} {at_least(run.verification.min_clearance)}")
+        kept.append(f"{scene} {words.at_least(run.verification.min_clearance)}")
         judged = verify(run.problem.under(box), run.trajectory)
-        worst = min(one.clearance for one in judged.counterexamples)
-        lost.append(f"{scene} {worst * MM_PER_M:.1f} mm")
+        worst = min(judged.counterexamples, key=lambda one: one.clearance)
+        lost.append(f"{scene} {words.at_most(worst.clearance, worst.deeper)}")
         error = touching_error(run.refinement)
         survived.append(f"{scene} {quantity(error, 'rad', math.floor)}")
     exact = Claim(
@@ -174,7 +175,7 @@ def dimensions(runs: Runs) -> Claim:
         worst = max(worst, float(off), float(rail))
     return Claim(
         "variability of dimension, 3D-2D-3D (1)", "holds",
-        f"links keep their length and the base its rail within {worst:.0e} m",
+        f"links keep their length and the base its rail within {words.at_most(worst)}",
         "`vdsm explain …`, Steps 2 and 6",
     )  # fmt: skip
 
@@ -185,7 +186,7 @@ def constant_ratio(runs: Runs) -> Claim:
     planar = run.centres[..., 1:]
     scaled = run.problem.manipulator.ratios[:, None] * planar[:, -1:]
     worst = float(np.abs(planar - scaled).max())
-    exactly = f"within {worst:.0e} m" if worst > 0.0 else "to the last bit"
+    exactly = f"within {words.at_most(worst)}" if worst > 0.0 else "to the last bit"
     return Claim(
         "constant ratio (1)", "holds without obstacles",
         f"Pᵢ = kᵢ,₉ P₉ {exactly}; in Step 5 for joints outside the region",
@@ -229,8 +230,8 @@ def simplification(times: dict[str, FloatArray]) -> Claim:
     return Claim(
         "simplification (1)", "holds",
         "17 unknowns and 3 equations become one choice for each joint in the region, "
-        f"a point on its boundary; a step takes {free:.0f} µs without obstacles and "
-        f"{blocked:.0f} µs round obs1",
+        f"a point on its boundary; a step takes {at_most(free)} µs without obstacles "
+        f"and {at_most(blocked)} µs round obs1",
         "`python analysis/claims.py`",
     )  # fmt: skip
 
@@ -306,7 +307,7 @@ def generality(per_family: int) -> tuple[Claim, list[str]]:
     claim = Claim(
         '"all kinds of obstacle environments" (1)', "does not hold",
         f"of {total} problems of HRM-1000's feasible families the rule draws {solved} "
-        f"whole ({100.0 * solved / total:.0f} %)",
+        f"whole ({percent(solved / total)})",
         f"`python analysis/claims.py --per-family {per_family}`",
     )  # fmt: skip
     return claim, table_lines(("family", "solved by `paper`"), lines)

@@ -13,6 +13,7 @@ from paper_figures.paper_says import AXIS_DISTANCE_MM
 from paper_figures.runs import STRATEGIES, Run, Runs
 from paper_figures.style import save_all
 from paper_figures.views import thin
+from result_files import at_least
 
 from vdsm_pin.units import MM_PER_M
 
@@ -66,7 +67,7 @@ def _axis_panel(axes: Axes, run: Run) -> None:
     draw_limit(axes, AXIS_DISTANCE_MM)
     k = int(np.argmin(distance))
     axes.plot(rows[k], distance[k], "o", color=style.INK, markersize=2.6, zorder=6)
-    _note(axes, f"least {distance[k]:.1f}")
+    _note(axes, f"least {at_least(distance[k], 1)}")
     shade_detours(axes, run)
     draw_moments(axes, run, size=6.0)
 
@@ -90,7 +91,7 @@ def _surface_panel(axes: Axes, run: Run) -> None:
     near = next(one for one in run.verification.approaches if one.pair.obstacle)
     least = near.lower * MM_PER_M
     axes.plot(near.interval, least, "o", color=style.INK, markersize=2.6, zorder=6)
-    _note(axes, f"at least {least:.1f}")
+    _note(axes, f"at least {at_least(least, 1)}")
     shade_detours(axes, run)
     draw_moments(axes, run, size=6.0)
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 import yaml
-from result_files import output_folder, table_lines, write_table
+from result_files import at_least, output_folder, table_lines, write_table
 
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -119,7 +119,7 @@ def markdown(lines: list[Line]) -> str:
              "sway borne without contact [mm]")  # fmt: skip
     rows = [
         (one.scene, one.strategy, one.arrival,
-         f"±{one.sway_kept_mm:.1f}", f"±{one.sway_clear_mm:.1f}")
+         f"±{at_least(one.sway_kept_mm, 1)}", f"±{at_least(one.sway_clear_mm, 1)}")
         for one in lines
     ]  # fmt: skip
     return "\n".join([*head, *table_lines(names, rows), ""])

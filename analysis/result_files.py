@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -24,6 +25,20 @@ def table_lines(head: Sequence[str], rows: Iterable[Iterable[object]]) -> list[s
     """The lines of a table in Markdown."""
     lines = ["| " + " | ".join(map(str, row)) + " |" for row in (head, *rows)]
     return [lines[0], "|" + "---|" * len(head), *lines[1:]]
+
+
+def at_least(value: float, digits: int = 0) -> str:
+    """A number that is kept, rounded down."""
+    return f"{math.floor(_without_noise(value, digits)) / 10.0**digits:.{digits}f}"
+
+
+def at_most(value: float, digits: int = 0) -> str:
+    """A number that is not exceeded, rounded up."""
+    return f"{math.ceil(_without_noise(value, digits)) / 10.0**digits:.{digits}f}"
+
+
+def _without_noise(value: float, digits: int) -> float:
+    return round(value * 10.0**digits, 6)
 
 
 def write_table(folder: Path, name: str, rows: Sequence[Any], text: str) -> None:

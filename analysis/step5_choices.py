@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 import shapely
 from paper_figures.runs import Runs
-from result_files import output_folder, table_lines, write_table
+from result_files import at_least, output_folder, table_lines, write_table
 
 from vdsm_pin.app.explanation.cross import DIRECTIONS, leave
 from vdsm_pin.arm.kinematics import link_angles
@@ -22,7 +22,7 @@ from vdsm_pin.planner.paper import joint_paths
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MM_PER_M, percent
 
 SCENES: Final = ("obs1", "obs2", "obs2-small")
 GROWTHS: Final = (0.0, 0.02, 0.04, 0.08)
@@ -147,13 +147,13 @@ def markdown(literals: list[Literal], singles: list[OneLine]) -> str:
             "largest jump of a joint [mm]", "link inside by [mm]")  # fmt: skip
     rows = [
         (one.scene, f"+{one.growth_mm:.0f}", one.waypoints, one.short,
-         f"{one.jump_mm:.0f}", f"{one.depth_mm:.0f}")
+         at_least(one.jump_mm), at_least(one.depth_mm))
         for one in literals
     ]  # fmt: skip
     drawn = {
         (one.line, one.scene): "–"
         if one.psi_deg is None or one.drawn is None
-        else f"{100.0 * one.drawn:.1f} %, {one.psi_deg:.1f}°"
+        else f"{percent(one.drawn)}, {one.psi_deg:.1f}°"
         for one in singles
     }
     lines = [

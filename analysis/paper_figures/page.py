@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import table1_parameters
+from result_files import at_least
 
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.units import MM_PER_M, proved_mm
@@ -71,7 +72,7 @@ def _distance_table(facts: dict[str, Any]) -> str:
         if "axis_distance" not in by["paper"]:
             continue
         both = by["paper"], by["fewest"]
-        cells = [f"{one['axis_distance']:.1f} mm" for one in both]
+        cells = [f"{at_least(one['axis_distance'], 1)} mm" for one in both]
         cells += [proved_mm(one["clearance"] / MM_PER_M) for one in both]
         lines.append(f"| {scene} | {' | '.join(cells)} |")
     return "\n".join(lines)

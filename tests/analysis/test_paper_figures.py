@@ -32,6 +32,7 @@ from paper_figures.style import (  # noqa: E402
 )
 from paper_figures.views import SIDE  # noqa: E402
 from PIL import Image  # noqa: E402
+from result_files import at_least, at_most  # noqa: E402
 
 from vdsm_pin.arm.manipulator import built_in  # noqa: E402
 
@@ -264,3 +265,24 @@ def test_no_letter_is_smaller_than_6_pt_in_print(file: Path) -> None:
     )
     assert sizes
     assert min(map(float, sizes)) >= 6.0
+
+
+def test_numbers_that_are_promised_are_rounded_to_the_safe_side() -> None:
+    assert (at_least(13.181, 1), at_most(13.181, 1)) == ("13.1", "13.2")
+    assert (at_least(-318.61, 1), at_most(-318.61, 1)) == ("-318.7", "-318.6")
+    for number in ("0.3", "4.4", "29.1", "265.0"):  # none of these is a binary number
+        assert at_least(float(number), 1) == at_most(float(number), 1) == number
+    assert (at_least(387.5), at_most(387.5)) == ("387", "388")
+
+
+def test_the_least_clearance_written_in_a_figure_is_one_that_is_proved(
+    runs: Runs, drawn: Drawn
+) -> None:
+    figures = drawn("fig17_clearance")
+    for k, axes in enumerate(figures["fig17-surface"].axes):
+        scene = ("obs1", "obs2", "obs2-small", "obs3")[k // 2]
+        run = runs(scene, ("paper", "fewest")[k % 2])
+        assert run.verification.min_clearance is not None
+        proved = 1e3 * run.verification.min_clearance
+        (text,) = [t.get_text() for t in axes.texts if "least" in t.get_text()]
+        assert proved - 0.1 < float(text.split()[-1]) <= proved
