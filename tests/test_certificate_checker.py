@@ -501,7 +501,18 @@ def test_a_limit_that_is_passed_is_rejected(tmp_path: Path) -> None:
     q[1, 1:3] = np.deg2rad(45.1)
     assert "psi1" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
     q[1] = [2.1, 0, 0, 0, 0, 0, 0]
-    assert "x0 is" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
+    assert "x0 is 2100" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
+
+
+@pytest.mark.parametrize("version", [8, 10, "9", None])
+def test_a_certificate_of_another_version_is_refused_by_name(
+    version: Any, tmp_path: Path
+) -> None:
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.0]), NO_ERRORS)
+    assert judge(case).accepted
+    lines = edited(case, lambda found: found[0].update(vdsm_certificate=version))
+    told = f"is of version {version}, as vdsm-pin"
+    assert told in refused(case, sealed(lines))
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from vdsm_pin.certificate_checker import check_certificate, claims
 from vdsm_pin.certificate_checker.arm import Arm
 from vdsm_pin.certificate_checker.balls import UP, Rejected
 from vdsm_pin.certificate_checker.claims import Clearances, Plane, clearances, tiled
+from vdsm_pin.certificate_checker.errors import reject_less
 from vdsm_pin.certificate_checker.motion import Branch, Interval, Path, Slices
 from vdsm_pin.certificate_checker.solids import Body, Pair, Solid
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
@@ -259,3 +260,10 @@ def test_planes_are_settled_before_more_wait_than_are_looked_at_at_once(
             Clearances(tree, path, [pair]).check(lines(wrong))
         assert wrong <= read[-1] <= wrong + at_once
         assert (read[-1] + 1) % (at_once + 1) == 0
+
+
+@pytest.mark.parametrize("stated", [{"a": 1.0, "b": 2.0}, {"b": 2.0}, {}, [1.0], 1.0])
+def test_errors_are_of_what_is_asked_for_and_of_nothing_else(stated: Any) -> None:
+    reject_less({"a": 1.0}, {"a": 1.0})
+    with pytest.raises(Rejected, match=r"numbers of each of \['a'\] alone"):
+        reject_less(stated, {"a": 1.0})

@@ -356,3 +356,17 @@ def test_rows_beside_what_moves_have_times(own_times: bool, other_times: bool) -
     else:
         with pytest.raises(Rejected, match="rows beside what moves have no times"):
             beside(own, [rail], [ball, Moving(ball, carrier, 1)])
+
+
+def test_a_branch_rests_before_its_first_knot_and_after_its_last() -> None:
+    """At that knot; in between it is on the straight line."""
+    branch = Branch(np.array([[2.0, -1.0], [5.0, 0.0], [4.0, 3.0]]), np.arange(1.0, 4))
+    for start, end, ends in (
+        (0.0, 1.0, [[2.0, 2.0], [-1.0, -1.0]]),
+        (1.0, 2.0, [[2.0, 5.0], [-1.0, 0.0]]),
+        (2.25, 2.5, [[4.75, 4.5], [0.75, 1.5]]),
+        (3.0, 4.0, [[4.0, 4.0], [3.0, 3.0]]),
+        (7.0, 9.0, [[4.0, 4.0], [3.0, 3.0]]),
+    ):
+        found = branch.between(start, end)
+        assert [[float(q) for q in points] for points in found] == ends

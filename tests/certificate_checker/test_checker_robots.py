@@ -289,6 +289,19 @@ def test_the_extent_of_a_link_is_that_of_all_it_is_worked_out_of(
     assert found(told).extent == pytest.approx(extent, rel=1e-12)
 
 
+def test_a_mesh_of_a_link_is_in_the_unit_that_its_file_states(tmp_path: Path) -> None:
+    """Half metres, of a box whose corners are at 1 m."""
+    found = trimesh.creation.box((2.0, 2.0, 2.0)).export(file_type="dae")
+    text = found.decode().replace("<up_axis>", '<unit meter="0.5"/><up_axis>')
+    (tmp_path / "m.dae").write_text(text)
+    shape = '<mesh filename="m.dae" scale="1 3 1"/>'
+    (tmp_path / "r.urdf").write_text(SHAPED.format(shape))
+    (link,) = Model(RobotFiles(tmp_path / "r.urdf"), np.eye(4)).links()
+    (solid,) = link.model.solids(link.element, "l", [])
+    corners = solid.points[0]
+    assert np.ptp(corners, axis=0) == pytest.approx([1.0, 3.0, 1.0], rel=1e-12)
+
+
 @pytest.mark.parametrize(("cover", "parts", "most"), [("hull", 9, 1), ("parts", 3, 3)])
 def test_a_mesh_is_covered_by_as_many_hulls_as_are_asked_for(
     cover: str, parts: int, most: int
