@@ -55,7 +55,7 @@ soundness: $(VENV)/.installed
 	$(BIN)/python analysis/soundness.py --queries 10000000 --save reports/soundness.md
 
 mutants: $(VENV)/.installed
-	$(BIN)/python -m analysis.mutation --sample 1000 --save out/mutants.md
+	$(BIN)/python -m analysis.mutation --save out/mutants.md
 
 bench: $(VENV)/.installed
 	$(BIN)/python -m benchmarks.report --save reports/performance

@@ -1,6 +1,6 @@
 """Counts how many small changes of the code the fast tests notice.
 
-    python -m analysis.mutation --sample 1000 --seed 0 --save out/mutants.md
+    python -m analysis.mutation --save out/mutants.md
 
 A change that no test can notice, since it changes nothing that is promised, stands in
 `equivalent.txt` with its reason. With `--kept FILE` a run takes up where another one
@@ -35,7 +35,7 @@ EQUIVALENT: Final = Path(__file__).with_name("equivalent.txt")
 MAPS: Final = Path(tempfile.gettempdir()) / "mutation-maps"
 """Which tests run which lines, kept for the next run."""
 
-BUDGET: Final = 12.0
+BUDGET: Final = 4.0
 """Tests are asked for a change until their usual times come to this; [s]."""
 
 WIDER: Final = 5
@@ -218,14 +218,20 @@ def results(
             return
 
 
-def page(trials: dict[str, list[Trial]], known: dict[str, str], seed: int) -> str:
-    """The counts as Markdown, what nobody noticed, and why the rest changes nothing."""
+def page(trials: dict[str, list[Trial]], known: dict[str, str], made: str) -> str:
+    """The counts as Markdown, what nobody noticed, and why the rest changes nothing.
+
+    Args:
+        trials: What came of changes, by group.
+        known: Reason by key of each change that is known to change nothing.
+        made: The command that tried them.
+    """
     lines = [
         "# Small changes of the code, and how many the fast tests notice",
         "",
         "One change at a time: a comparison, a sign, an operator, a constant, a",
         "condition, two arguments in each other's place, a statement left out. Made by",
-        f"`make mutants`, seed {seed}. What is equivalent changes nothing that is",
+        f"`{made}`. What is equivalent changes nothing that is",
         "promised; *after* are those of them that were tried first and judged then.",
         "",
         "| code | changes | equivalent | after | noticed | share of the others | s |",
@@ -290,7 +296,9 @@ def main() -> None:
                 line = f"{trial.change.line}, {trial.tests} tests"
                 print(f"not noticed: {trial.change.key} (line {line})", flush=True)
     print(f"{computed():.0f} s of processor time, with the maps", flush=True)
-    text = page(trials, known, asked.seed)
+    words = f"--sample {asked.sample} --seed {asked.seed} --budget {asked.budget:g}"
+    groups_asked = "".join(f" --group {name}" for name in asked.group or ())
+    text = page(trials, known, f"python -m analysis.mutation {words}{groups_asked}")
     if asked.save:
         asked.save.parent.mkdir(parents=True, exist_ok=True)
         asked.save.write_text(text, encoding="utf-8")
