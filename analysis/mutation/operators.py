@@ -71,9 +71,8 @@ def _is_left_out(node: ast.AST) -> bool:
     """Whether a statement is left out by itself; a return only within another one."""
     if isinstance(node, ast.Assign):
         return isinstance(node.targets[0], ast.Subscript)
-    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
-        return getattr(node.value.func, "id", "") != "apart"  # a word to the compiler
-    return isinstance(node, LEFT_OUT)
+    called = isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
+    return called or isinstance(node, LEFT_OUT)
 
 
 def by_place(tree: ast.Module) -> dict[int, ast.AST]:

@@ -13,7 +13,7 @@ PROGRAM = """
 import time
 from typing import NamedTuple
 import numpy as np
-from vdsm_pin.compiled import apart, borrowed, clock, compiled
+from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.compiled.choice import compiler
 from vdsm_pin.geometry.row_bounds import _crossing_gap
 
@@ -21,9 +21,8 @@ class Two(NamedTuple):
     values: np.ndarray
     scale: float
 
-@compiled
+@compiled(inline=False)
 def _scaled(two):
-    apart()
     return two.scale * two.values[0] / 3.0
 
 @compiled

@@ -19,14 +19,17 @@ import os
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cached_property, update_wrapper
+from functools import cached_property, partial, update_wrapper
 from threading import RLock
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, TypeVar, overload
 
 import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
+
+NOT_INLINED: Final = "not_inlined"
+"""The attribute of a function that is not to be copied into its callers."""
 
 _C, _FORTRAN, _ALIGNED, _WRITE = 0x1, 0x2, 0x100, 0x400
 """Bits of an array's flags, as numpy numbers them."""
@@ -154,23 +157,6 @@ def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
     return made
 
 
-class _Apart:
-    """Keeps the function that calls it from being copied into its callers.
-
-    Without it every large function is optimised again inside every other one, and
-    compiling takes minutes.
-    """
-
-    def __call__(self) -> None:
-        """Nothing, where Python calls it."""
-
-    @cached_property
-    def _numba_type_(self) -> Any:
-        from vdsm_pin.compiled.intrinsics import apart
-
-        return apart()
-
-
 class _Clock:
     """The monotonic clock, for loops that a deadline ends; [s]."""
 
@@ -207,7 +193,15 @@ class _Borrowed:
         return borrowed()
 
 
-def compiled(function: F) -> F:
+@overload
+def compiled(function: F, /) -> F: ...
+
+
+@overload
+def compiled(*, inline: bool) -> Callable[[F], F]: ...
+
+
+def compiled(function: F | None = None, /, *, inline: bool = True) -> Any:
     """Run a function as machine code, keeping its type.
 
     Arguments are positional: arrays, numbers, and tuples of them. For each new kind of
@@ -217,12 +211,20 @@ def compiled(function: F) -> F:
     With NUMBA_DISABLE_JIT=1, as numba has it, functions stay as they stand: for
     debuggers and for coverage. With VDSM_PLAIN_NUMBA=1, and where the installed numba
     lacks what `compiling` steps into, numba compiles and keeps them in its own way.
+
+    Args:
+        function: The function.
+        inline: Whether it may be copied into its callers. A large function that may
+            is optimised again inside every other one, and compiling takes minutes.
     """
+    if function is None:
+        return partial(compiled, inline=inline)
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         return function
-    return cast(F, _Compiled(function))
+    if not inline:
+        vars(function)[NOT_INLINED] = True
+    return _Compiled(function)
 
 
-apart: Final = _Apart()
 borrowed: Final = _Borrowed()
 clock: Final = _Clock()

@@ -18,7 +18,7 @@ from numba._dynfunc import make_function
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-from vdsm_pin.compiled.intrinsics import OPTIONS, by_type
+from vdsm_pin.compiled.intrinsics import OPTIONS, by_type, pipeline
 from vdsm_pin.compiled.machine_code import MachineCode, load
 
 
@@ -90,9 +90,8 @@ def machine_code(
     """
     njit: Any = numba.njit
     typeof: Any = numba.typeof
-    whole = njit(pipeline_class=_WholeCompiler, no_cfunc_wrapper=True, **OPTIONS)(
-        function
-    )
+    steps = pipeline(function, _WholeCompiler)
+    whole = njit(pipeline_class=steps, no_cfunc_wrapper=True, **OPTIONS)(function)
     signature = tuple(typeof(argument) for argument in arguments)
     whole.compile(signature)
     result = whole.overloads[signature]
@@ -133,7 +132,7 @@ def part(function: Callable[..., Any]) -> Any:
     """A function for other functions being compiled, in numba's form."""
     njit: Any = numba.njit
     made = njit(
-        pipeline_class=_PartCompiler,
+        pipeline_class=pipeline(function, _PartCompiler),
         no_cpython_wrapper=True,
         no_cfunc_wrapper=True,
         **OPTIONS,

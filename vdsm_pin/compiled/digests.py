@@ -14,6 +14,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from vdsm_pin.compiled import NOT_INLINED
+
 _PACKAGE: Final = __name__.partition(".")[0]
 _PLAIN: Final = (type(None), bool, int, float, complex, str, bytes, type(...))
 _BY_VERSION: Final = ("numpy", "math", "numba", "builtins")
@@ -39,7 +41,11 @@ def digest_of(function: FunctionType) -> bytes:
 def _read(function: FunctionType) -> tuple[bytes, tuple[FunctionType, ...]]:
     """A digest of a function by itself, and the functions that it calls."""
     called: dict[FunctionType, None] = {}
-    words = [function.__module__, function.__qualname__]
+    words = [
+        function.__module__,
+        function.__qualname__,
+        repr(NOT_INLINED in vars(function)),
+    ]
     words += _code_words(function.__code__)
     words += [_word(value, called) for value in function.__defaults__ or ()]
     for name, value in sorted(_named(function).items()):

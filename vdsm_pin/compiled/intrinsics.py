@@ -1,12 +1,16 @@
 """What kernels call that numba does not have, and how every kernel is compiled."""
 
+from collections.abc import Callable
 from time import CLOCK_MONOTONIC
 from typing import Any, Final, cast
 
 from llvmlite import ir
 from numba.core import cgutils, types
+from numba.core.compiler import Compiler
 from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
 from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
+
+from vdsm_pin.compiled import NOT_INLINED
 
 OPTIONS: Final = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 """No fast-math: the bounds rest on every operation being rounded once, as written.
@@ -30,20 +34,29 @@ def by_type(made: Any) -> Any:
     return made
 
 
-def apart() -> Any:
-    """The numba type of the function that forbids to copy its caller."""
+def pipeline(function: Callable[..., Any], steps: type[Compiler]) -> type[Compiler]:
+    """The steps of numba that compile a function.
 
-    def define(typing_context: Any) -> Any:
-        return types.void(), generate
+    Where it is not to be copied into its callers, LLVM is told so.
+    """
+    if not vars(function).get(NOT_INLINED):
+        return steps
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        builder.function.attributes.add("noinline")
-        return context.get_dummy_value()
+    class NotInlined(steps):  # type: ignore[valid-type,misc]
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
+            state = self.state
+            lowered = state.targetctx.post_lowering
 
-    template: Any = make_intrinsic_template
-    return types.Function(
-        template(define, define, "apart", prefer_literal=False, kwargs={})
-    )
+            def post_lowering(module: Any, library: Any) -> None:
+                if library is state.library:  # not what numba compiles beside it
+                    made = next(one for one in module.functions if one.blocks)
+                    made.attributes.add("noinline")
+                lowered(module, library)
+
+            state.targetctx.post_lowering = post_lowering
+
+    return NotInlined
 
 
 def clock() -> Any:

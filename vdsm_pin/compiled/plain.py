@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.compiler import Compiler
 
 from vdsm_pin import kept
-from vdsm_pin.compiled.intrinsics import OPTIONS, by_type
+from vdsm_pin.compiled.intrinsics import OPTIONS, by_type, pipeline
 
 
 @cache
@@ -22,7 +23,8 @@ def part(function: Callable[..., Any]) -> Any:
     """A function for Python and for other functions being compiled."""
     _keep_apart()
     njit: Any = numba.njit
-    return by_type(njit(cache=True, **OPTIONS)(function))
+    steps = pipeline(function, Compiler)
+    return by_type(njit(cache=True, pipeline_class=steps, **OPTIONS)(function))
 
 
 @cache

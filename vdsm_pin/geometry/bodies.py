@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 
 ALIGNED: Final = 1e-14
@@ -47,13 +47,12 @@ class Body(NamedTuple):
     used: IntArray
 
 
-@compiled
+@compiled(inline=False)
 def new_body(n_points: int, n_corners: int, room: int) -> Body:
     """A body of points in the origin, not grown, with room for so many generators.
 
     Without room for one its corners are never grown.
     """
-    apart()
     grown = n_corners if room > 0 else 0
     count = np.zeros(2, np.int64)
     count[0], count[1] = n_points, n_corners

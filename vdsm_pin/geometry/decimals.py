@@ -3,7 +3,7 @@
 from math import ceil, floor, isnan, log10
 from typing import Final
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import ByteArray, FloatArray, IntArray
 
 WORD: Final = -1
@@ -53,12 +53,11 @@ def _put_units(scaled: float, unit: int, rounding: int, out: ByteArray, at: int)
     return at
 
 
-@compiled
+@compiled(inline=False)
 def _put_number(
     value: float, decimals: int, rounding: int, out: ByteArray, at: int
 ) -> int:
     """Any number, large ones with an exponent, NaN as nothing; the place behind it."""
-    apart()
     if isnan(value):
         return at
     if abs(value) == float("inf"):

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, compiled
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 
 PLANES: Final = 0
@@ -100,10 +100,9 @@ def _in_round(inside: Inside, x: FloatArray, way: FloatArray) -> float:
     return side
 
 
-@compiled
+@compiled(inline=False)
 def _depth(inside: Inside, x: FloatArray, way: FloatArray) -> float:
     """How deep a point lies in a piece at most, and the way to lie deeper, (3,)."""
-    apart()
     if inside.kind == PLANES:
         return _in_planes(inside, x, way)
     return _in_round(inside, x, way)

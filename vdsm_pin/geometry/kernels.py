@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import ALIGNED, Body, body_support
 from vdsm_pin.geometry.pieces import CYLINDER, HALF_SPACE, PackedPieces
@@ -99,12 +99,11 @@ def rounding_radius(pieces: PackedPieces, p: int) -> float:
     return float(pieces.radius[p])
 
 
-@compiled
+@compiled(inline=False)
 def _half_space_bracket(
     pieces: PackedPieces, p: int, body: Body, out: FloatArray
 ) -> None:
     """The exact distance to a half-space."""
-    apart()
     n = pieces.axis[p]
     near = out[NEAR:FAR]
     high = body_support(body, -n[0], -n[1], -n[2], near)
@@ -185,7 +184,7 @@ def _known(scratch: FloatArray, m: int) -> bool:
     return False
 
 
-@compiled
+@compiled(inline=False)
 def _direction(
     scratch: FloatArray, m: int, distance: float
 ) -> tuple[float, float, float]:
@@ -193,7 +192,6 @@ def _direction(
 
     Near a large triangle the plane has it far better than a point in it has.
     """
-    apart()
     if m == 3:
         a, b, c = scratch[0], scratch[1], scratch[2]
         ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -212,7 +210,7 @@ def _direction(
     )
 
 
-@compiled
+@compiled(inline=False)
 def _iterate(
     pieces: PackedPieces,
     p: int,
@@ -222,7 +220,6 @@ def _iterate(
     out: FloatArray,
 ) -> None:
     """Core distance, from the direction in `out`; a bracket is left in `out`."""
-    apart()
     weights = out[BRACKET : BRACKET + 4]
     nx, ny, nz = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
     out[LOWER], out[UPPER] = -np.inf, np.inf
@@ -264,7 +261,7 @@ def bracket(
     bracket_to(pieces, p, body, Goal(goal, 0.0, 0.0, np.inf), scratch, out)
 
 
-@compiled
+@compiled(inline=False)
 def bracket_to(
     pieces: PackedPieces,
     p: int,
@@ -285,7 +282,6 @@ def bracket_to(
             zero; on return the bracket. Where the bodies meet both bounds are below or
             at 0 and only their sign is meant; `lower` may be far below `upper`.
     """
-    apart()
     if pieces.kind[p] == HALF_SPACE:
         _half_space_bracket(pieces, p, body, out)
         return

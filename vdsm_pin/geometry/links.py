@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, compiled
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import Body, new_body
 from vdsm_pin.geometry.kernels import LOWER, NORMAL
@@ -116,7 +116,7 @@ def _first(ends: FloatArray, boxes: FloatArray, far: FloatArray) -> int:
     return nearest
 
 
-@compiled
+@compiled(inline=False)
 def _measure(
     pieces: PackedPieces,
     covers: IntArray,
@@ -127,7 +127,6 @@ def _measure(
     result: FloatArray,
 ) -> None:
     """Write what is left of each distance where `off` is taken off it; [m]."""
-    apart()
     pieces, work = borrowed(pieces), borrowed(work)
     body, far, out = work.body, work.far, work.measuring.out
     for link in range(result.shape[1]):

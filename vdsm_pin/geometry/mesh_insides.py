@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.closed_meshes import SIGNED, SINGLE, SOLID
 from vdsm_pin.geometry.obstacles import STACK
@@ -45,7 +45,7 @@ def has_inside(pieces: PackedPieces, covers: IntArray, obstacle: int) -> bool:
     return bool(covers[pieces.node_range[pieces.root[obstacle], 0]] & SOLID)
 
 
-@compiled
+@compiled(inline=False)
 def encloses(
     pieces: PackedPieces, covers: IntArray, obstacle: int, point: FloatArray
 ) -> bool:
@@ -63,7 +63,6 @@ def encloses(
         obstacle: A mesh for which `has_inside` holds.
         point: Shape (3,); [m].
     """
-    apart()
     x, y, z = point[0], point[1], point[2]
     stack = np.zeros(STACK, np.int64)
     stack[0] = pieces.root[obstacle]

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import RADIUS, Body, body_reach
 from vdsm_pin.geometry.kernels import (
@@ -96,7 +96,7 @@ def box_support(
     return float(x + y + z)
 
 
-@compiled
+@compiled(inline=False)
 def obstacle_bracket(
     pieces: PackedPieces, obstacle: int, body: Body, goal: float, work: Measuring
 ) -> None:
@@ -111,7 +111,6 @@ def obstacle_bracket(
             least lower and the least upper bound over the pieces, with n of the former
             and the witness points of the latter.
     """
-    apart()
     stack, trial, out = work.stack, work.trial, work.out
     scratch = work.scratch
     root = pieces.root[obstacle]
@@ -140,7 +139,7 @@ def obstacle_bracket(
         keep_least(trial, out)
 
 
-@compiled
+@compiled(inline=False)
 def node_support(
     pieces: PackedPieces, node: int, n: FloatArray, stack: IntArray, point: FloatArray
 ) -> float:
@@ -154,7 +153,6 @@ def node_support(
         stack: Working space, shape (STACK,).
         point: Working space, shape (3,).
     """
-    apart()
     least = np.inf
     stack[0] = node
     waiting = 1

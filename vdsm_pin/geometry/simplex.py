@@ -4,7 +4,7 @@ A simplex is the first m <= 4 rows of an array; the result is written as weights
 Nothing here has to be exact: it only proposes a plane and two witness points.
 """
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 
 
@@ -37,12 +37,11 @@ def on_segment(w: FloatArray, i: int, j: int) -> float:
     return 1.0 if along >= span else along / span
 
 
-@compiled
+@compiled(inline=False)
 def on_triangle(
     w: FloatArray, i: int, j: int, k: int
 ) -> tuple[float, float, float, float]:
     """Weights of the corners and the squared distance, by Voronoi regions."""
-    apart()
     ii, jj, kk = _dot(w, i, i), _dot(w, j, j), _dot(w, k, k)
     ij, ik, jk = _dot(w, i, j), _dot(w, i, k), _dot(w, j, k)
     # Projections of the origin on the edges, seen from each corner.
@@ -95,7 +94,7 @@ def _inside(w: FloatArray, weights: FloatArray) -> bool:
     return True
 
 
-@compiled
+@compiled(inline=False)
 def nearest(w: FloatArray, m: int, weights: FloatArray) -> None:
     """Weights of the point nearest to the origin, written to `weights`.
 
@@ -104,7 +103,6 @@ def nearest(w: FloatArray, m: int, weights: FloatArray) -> None:
         m: 1 to 4.
         weights: Result, shape (4,), not negative, sum 1; 0 beyond m.
     """
-    apart()
     weights[:] = 0.0
     if m == 1:
         weights[0] = 1.0

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.motions import Motion, bound_column
 from vdsm_pin.proof.packed_tree import PRISMATIC, REVOLUTE
@@ -55,7 +55,7 @@ def stay(ways: Ways, bends: Bends, way: int) -> None:
         way = ways.before[way]
 
 
-@compiled
+@compiled(inline=False)
 def bend_between(
     task: Task, motion: Motion, bends: Bends, way: int, k: int, start: float, end: float
 ) -> None:
@@ -63,7 +63,6 @@ def bend_between(
 
     Times run from 0 to 1 over the whole interval; all along the way is written.
     """
-    apart()
     tree, ways, errors = task.tree, task.ways, task.errors
     if k + 1 >= motion.knots.shape[0] or not end > start:
         stay(ways, bends, way)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, clock, compiled
+from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.proof.broad_phase import settle_far
 from vdsm_pin.proof.cached_planes import served
@@ -48,7 +48,7 @@ def _serves(
     return True
 
 
-@compiled
+@compiled(inline=False)
 def _sweep_block(
     task: Task,
     motion: Motion,
@@ -59,7 +59,6 @@ def _sweep_block(
     settled: BoolArray,
 ) -> bool:
     """All near pairs over a block whose rows are filled, as `sweep`."""
-    apart()
     runs, pairs, count = work.runs, task.pairs, stretch.size
     quick = task.rules.steady and results.dense.verdict.shape[0] == 0
     for pair in near:
@@ -77,7 +76,7 @@ def _sweep_block(
     return True
 
 
-@compiled
+@compiled(inline=False)
 def _sweep(
     task: Task,
     motion: Motion,
@@ -88,7 +87,6 @@ def _sweep(
     yes_or_no: bool,
 ) -> bool:
     """`sweep` of what is borrowed."""
-    apart()
     block = work.rows.block
     if task.rules.steady and block[TURNED]:
         # Whoever asks about several error boxes leaves here what the last one added.

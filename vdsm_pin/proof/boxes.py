@@ -8,7 +8,7 @@ from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.error_growth import crude_growth
@@ -17,7 +17,7 @@ from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.terms import Task, finer
 
 
-@compiled
+@compiled(inline=False)
 def body_box(
     task: Task,
     rows: Rows,
@@ -42,7 +42,6 @@ def body_box(
     Returns:
         The sum of its sides; [m].
     """
-    apart()
     first, last = span
     low[:], high[:] = np.inf, -np.inf
     bodies, places, tracks = task.bodies, task.places, rows.tracks
@@ -68,12 +67,11 @@ def body_box(
     return float(high[0] - low[0] + high[1] - low[1] + high[2] - low[2])
 
 
-@compiled
+@compiled(inline=False)
 def box_gaps(
     box: FloatArray, low: FloatArray, high: FloatArray, gap: FloatArray
 ) -> None:
     """Distance of a body's box from every obstacle's; [m]."""
-    apart()
     lx, ly, lz, hx, hy, hz = (
         box[0, 0],
         box[0, 1],
@@ -90,12 +88,11 @@ def box_gaps(
         gap[o] = sqrt(x * x + y * y + z * z)
 
 
-@compiled
+@compiled(inline=False)
 def box_reaches(
     point: FloatArray, low: FloatArray, high: FloatArray, rise: float, reach: FloatArray
 ) -> None:
     """Upper bounds: the farthest corner from a point of each obstacle; [m]."""
-    apart()
     px, py, pz = point[0], point[1], point[2]
     ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
     for o in range(reach.size):

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import Measuring, obstacle_bracket
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
@@ -28,7 +28,7 @@ SPREAD: Final = 1.5
 """A box over several intervals may be larger than one of an interval by this; [-]."""
 
 
-@compiled
+@compiled(inline=False)
 def _nearest_upper(
     task: Task, work: Workspace, broad: BroadPhase, body: int, start: int
 ) -> float:
@@ -37,7 +37,6 @@ def _nearest_upper(
     At a row of the block, whose number is that of the first interval of the nearest
     box; inf for a body without pairs.
     """
-    apart()
     pair, row, least, space = -1, 0, np.inf, work.space
     for o in range(broad.number.shape[1]):
         if broad.number[body, o] >= 0 and broad.gap[body, o] < least:
@@ -56,7 +55,7 @@ def _nearest_upper(
     return float(space.out[UPPER] + mover.rise)
 
 
-@compiled
+@compiled(inline=False)
 def _settle_body(
     task: Task,
     results: Results,
@@ -75,7 +74,6 @@ def _settle_body(
         upper: Upper bound of the distance of its nearest obstacle; [m].
         n_near: Near pairs so far.
     """
-    apart()
     threshold = max(upper, results.limit[ACROSS])
     gap, reach = broad.gap[body], broad.reach[body]
     far, number = broad.far[body], broad.number[body]
@@ -91,12 +89,11 @@ def _settle_body(
     return n_near
 
 
-@compiled
+@compiled(inline=False)
 def _bound_body(
     task: Task, work: Workspace, broad: BroadPhase, body: int, stretch: Stretch
 ) -> None:
     """Bounds of a body over a block to all obstacles, by boxes over a few intervals."""
-    apart()
     rows, pair, low, high = work.rows, broad.some[body], np.zeros(3), np.zeros(3)
     gap, reach, when = broad.gap[body], broad.reach[body], broad.when
     count, rise = stretch.size, task.rules.pad - task.bodies.radius[body]
@@ -118,7 +115,7 @@ def _bound_body(
         gap[o] -= task.pairs.lost[number] if number >= 0 else 0.0
 
 
-@compiled
+@compiled(inline=False)
 def settle_far(
     task: Task, work: Workspace, results: Results, broad: BroadPhase, stretch: Stretch
 ) -> int:
@@ -134,7 +131,6 @@ def settle_far(
     Returns:
         The number of near pairs.
     """
-    apart()
     n_bodies, n_obstacles = broad.gap.shape
     if n_obstacles <= FEW:
         return broad.near.size

@@ -6,7 +6,7 @@ What one walk proved serves the rows around it (conservative advancement).
 
 from math import sqrt
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import Body
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE
@@ -30,7 +30,7 @@ def hold(plane: FloatArray, clearance: float, body: Body) -> None:
             plane[HELD_AT + 3 * k + c] = body.points[corners + k, c]
 
 
-@compiled
+@compiled(inline=False)
 def raise_to_held(
     mover: Mover,
     tracks: Tracks,
@@ -52,7 +52,6 @@ def raise_to_held(
         last: One past the last.
         lower: Updated, shape (BLOCK,); [m].
     """
-    apart()
     before, slots = 0.0, mover.slots
     for row in range(first, last + 1):
         moved = sag = 0.0

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.cached_clearances import raise_to_held
@@ -86,7 +86,7 @@ def _grow(
     grow_corners(task, mover, rows, toward, first, crudely, runs.growth)
 
 
-@compiled
+@compiled(inline=False)
 def try_plane(
     task: Task, mover: Mover, rows: Rows, runs: Runs, plane: FloatArray, demand: Demand
 ) -> int:
@@ -103,7 +103,6 @@ def try_plane(
     Returns:
         The first interval that the plane does not serve, or `demand.last`.
     """
-    apart()
     first, last, steady = demand.first, demand.last, task.rules.steady
     done, disc = first, mover.disc[RADIUS]
     crudely = not steady and np.isinf(demand.slack)

@@ -7,7 +7,7 @@ axis. Shifts cost every plane the same and are not added here.
 
 from math import sqrt
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.packed_tree import PRISMATIC, PackedTree
@@ -77,12 +77,11 @@ def _cross(rows: Rows, toward: FloatArray, first: int, end: int) -> None:
             out[r] = p[r] * v[r] - q[r] * u[r]
 
 
-@compiled
+@compiled(inline=False)
 def _add_turn(
     tree: PackedTree, rows: Rows, joint: int, error: float, first: int, end: int
 ) -> None:
     """Add error |axis . (arm x n)| to work[6], rows [first, end)."""
-    apart()
     frame, axis = rows.frames[joint + 1], tree.axis[joint]
     work, swing = rows.work, rows.work[6, first:end]
     x, y, z = work[3, first:end], work[4, first:end], work[5, first:end]
@@ -112,7 +111,7 @@ def _add_tilt(rows: Rows, tilt: float, first: int, end: int) -> None:
         work[7, r] += tilt * sqrt(x * x + y * y + z * z)
 
 
-@compiled
+@compiled(inline=False)
 def _swing(
     task: Task, rows: Rows, way: int, based: FloatArray, toward: FloatArray, first: int
 ) -> None:
@@ -120,7 +119,6 @@ def _swing(
 
     From row `first` on. Joints that meet in one origin share their arm.
     """
-    apart()
     tree, ways, errors = task.tree, task.ways, task.errors
     end, ready = toward.shape[1], -1
     rows.work[6:, first:end] = 0.0
@@ -145,7 +143,7 @@ def _swing(
         way = ways.before[way]
 
 
-@compiled
+@compiled(inline=False)
 def grow_corners(
     task: Task,
     mover: Mover,
@@ -167,7 +165,6 @@ def grow_corners(
         crudely: Whether a bound for any n will do.
         growth: Written at [first, last), shape (corners, BLOCK); [m].
     """
-    apart()
     errors, places, last = task.errors, task.places, toward.shape[1] - 1
     beyond = mover.disc[RADIUS] * errors.turned[mover.way]
     for k in range(mover.slots.size):

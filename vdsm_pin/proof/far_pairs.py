@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, compiled
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.proof.motions import Motion, interpolate
@@ -66,10 +66,9 @@ class BroadPhase(NamedTuple):
     least: FloatArray
 
 
-@compiled
+@compiled(inline=False)
 def new_broad_phase(task: Task, n_obstacles: int) -> BroadPhase:
     """Nothing settled yet; the first obstacles of the packed scene are looked at."""
-    apart()
     task = borrowed(task)
     pieces, pairs, ways = task.pieces, task.pairs, task.ways
     n_bodies, n_pairs = task.bodies.frame.size, pairs.rough.shape[0]
@@ -126,12 +125,11 @@ def keep_least(
         least[o] = values[o] if values[o] < least[o] else least[o]
 
 
-@compiled
+@compiled(inline=False)
 def dense_far(
     task: Task, dense: Dense, rows: Rows, broad: BroadPhase, offset: int, count: int
 ) -> None:
     """Dense rows of the far pairs; witnesses are the obstacle's point and a corner."""
-    apart()
     n_bodies, n_obstacles = broad.far.shape
     bodies = task.bodies
     for body in range(n_bodies):
@@ -176,12 +174,11 @@ def _lower_profile(
             part[k] = part[k] if part[k] < value else value
 
 
-@compiled
+@compiled(inline=False)
 def profile_far(
     task: Task, results: Results, broad: BroadPhase, start: int, count: int
 ) -> None:
     """Lower the profile's bins of a block to the least bounds of its far pairs."""
-    apart()
     n_bodies, n_obstacles = broad.far.shape
     profile, stride = results.profile, results.stride
     bodies = task.bodies
@@ -206,7 +203,7 @@ def profile_far(
             _lower_profile(profile, stride, column, low, high, start, count)
 
 
-@compiled
+@compiled(inline=False)
 def merge_far(
     task: Task, motion: Motion, ends: Ends, results: Results, broad: BroadPhase
 ) -> None:
@@ -219,7 +216,6 @@ def merge_far(
         results: Where to write.
         broad: What was settled.
     """
-    apart()
     at = np.zeros(3)
     n_bodies, n_obstacles = broad.number.shape
     for body in range(n_bodies):

@@ -1,14 +1,13 @@
 """Slices of intervals in a heap, the one of the least bound first."""
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.layouts import KEY
 
 
-@compiled
+@compiled(inline=False)
 def push(heap: FloatArray, count: int, row: FloatArray) -> int:
     """Add a slice to a heap of `count` slices; returns the new count."""
-    apart()
     at = count
     while at > 0:
         parent = (at - 1) // 2
@@ -20,10 +19,9 @@ def push(heap: FloatArray, count: int, row: FloatArray) -> int:
     return count + 1
 
 
-@compiled
+@compiled(inline=False)
 def pop(heap: FloatArray, count: int, row: FloatArray) -> int:
     """Take the slice of the least bound; returns the new count."""
-    apart()
     row[:] = heap[0]
     count -= 1
     last = heap[count].copy()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, clock, compiled
+from vdsm_pin.compiled import clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.heaps import pop, push
 from vdsm_pin.proof.layouts import (
@@ -28,13 +28,12 @@ from vdsm_pin.proof.terms import ACROSS, Task
 from vdsm_pin.proof.workspace import Workspace
 
 
-@compiled
+@compiled(inline=False)
 def _in_order(task: Task, results: Results, group: int, heap: FloatArray) -> IntArray:
     """The candidates of a group that may hold the least bound.
 
     The least first, since it lowers the limit most, then block by block.
     """
-    apart()
     held, pairs = results.candidates, task.pairs
     row, count, n_pairs = np.zeros(SLICE), 0, pairs.rough.shape[0]
     for c in range(results.tally[HELD]):
@@ -53,7 +52,7 @@ def _in_order(task: Task, results: Results, group: int, heap: FloatArray) -> Int
     return order
 
 
-@compiled
+@compiled(inline=False)
 def _look_again(
     task: Task,
     motion: Motion,
@@ -68,7 +67,6 @@ def _look_again(
         Their number. What finds no room, or is not looked at since links and obstacles
         meet, is left in `results.overflow`.
     """
-    apart()
     held, lower, count = results.candidates, work.runs.lower, 0
     heap = work.intervals
     row, beyond = np.zeros(SLICE), results.overflow
@@ -99,7 +97,7 @@ def _look_again(
     return count
 
 
-@compiled
+@compiled(inline=False)
 def _raise_bounds(
     task: Task, results: Results, group: int, heap: FloatArray, count: int
 ) -> None:
@@ -113,7 +111,6 @@ def _raise_bounds(
             proved to be above the limit, less the gap.
         count: Number of these rows.
     """
-    apart()
     groups, best, profile = task.pairs.group, results.best, results.profile
     proved = np.full(best.shape[0], results.limit[group] - task.rules.gap)
     for k in range(count):
@@ -131,7 +128,7 @@ def _raise_bounds(
                 profile[0, column, k] = max(profile[0, column, k], least)
 
 
-@compiled
+@compiled(inline=False)
 def narrow(
     task: Task, motion: Motion, work: Workspace, results: Results, group: int
 ) -> None:
@@ -144,7 +141,6 @@ def narrow(
         results: Holds the candidates; bounds, profile and limit are improved.
         group: The group.
     """
-    apart()
     heap = work.intervals
     order = _in_order(task, results, group, heap)
     if order.size == 0:

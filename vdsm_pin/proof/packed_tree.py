@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, compiled
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 
@@ -178,15 +178,14 @@ def _move_frame(
         origins[joint + 1, c] = at
 
 
-@compiled
+@compiled(inline=False)
 def place_tree(tree: PackedTree, q: FloatArray, pose: Pose) -> None:
     """All frames of one configuration q, shape (n_columns,)."""
-    apart()
     for joint in range(tree.parent.size):
         _move_joint(tree, q, joint, pose)
 
 
-@compiled
+@compiled(inline=False)
 def place_two(
     tree: PackedTree,
     q: FloatArray,
@@ -203,7 +202,6 @@ def place_two(
         steps: Working space, shape (n_frames,).
         pose: Written; other frames are as they were.
     """
-    apart()
     (one, other), size = frames, 0
     while one > 0 or other > 0:
         # The later one hangs on one that comes before it: they go down to the world.

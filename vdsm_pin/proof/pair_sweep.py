@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, clock, compiled
+from vdsm_pin.compiled import clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL, Goal
@@ -81,7 +81,7 @@ class Stretch(NamedTuple):
     again: bool
 
 
-@compiled
+@compiled(inline=False)
 def _renew(
     task: Task,
     version: int,
@@ -106,7 +106,6 @@ def _renew(
         The clearance proved for that interval, where the partner is of many pieces and
         needs more than one plane, else -inf; [m].
     """
-    apart()
     pieces, space, plane = task.pieces, work.space, work.planes[pair]
     root, proved = pieces.root[task.pairs.obstacle[version]], -np.inf
     mover, plane[ROW] = seen(task, work.rows, version), version
@@ -154,12 +153,11 @@ def _renew_witness(
     place_own(mover, rows, work.runs, plane, rows.ways.shape[2])
 
 
-@compiled
+@compiled(inline=False)
 def _look_at_row(
     task: Task, work: Workspace, results: Results, local: int, pair: int
 ) -> None:
     """Lower the limit to what can be proved at a row at all, within the error box."""
-    apart()
     load_rows(task, seen(task, work.rows, pair), work, local, local)
     space = work.space
     space.out[NORMAL:NEAR] = work.planes[pair, :3]
@@ -168,7 +166,7 @@ def _look_at_row(
     results.limit[group] = min(results.limit[group], space.out[LOWER])
 
 
-@compiled
+@compiled(inline=False)
 def _subdivide(
     task: Task,
     motion: Motion,
@@ -179,7 +177,6 @@ def _subdivide(
     local: int,
 ) -> int:
     """Decide one interval of a block by subdivision; its verdict."""
-    apart()
     row, witness = np.zeros(SLICE), new_witness()
     slicing = Slicing(task, motion, work.ends, work.space)
     k = stretch.start + local
@@ -213,7 +210,7 @@ def _subdivide(
     return verdict
 
 
-@compiled
+@compiled(inline=False)
 def _dense_stretch(
     mover: Mover,
     work: Workspace,
@@ -224,7 +221,6 @@ def _dense_stretch(
     last: int,
 ) -> None:
     """Write intervals that one plane and witness bound to the dense results."""
-    apart()
     runs, dense, pose = work.runs, results.dense, work.ends.start
     at_rows, points = runs.at_rows, work.planes[pair, OWN_POINT:WIDTH]
     for r in range(first, last):
@@ -268,7 +264,7 @@ def _face(task: Task, mover: Mover, rows: Rows, plane: FloatArray, pair: int) ->
         plane[c] = pieces.centre[p, c] - place[c, 0]
 
 
-@compiled
+@compiled(inline=False)
 def sweep_pair(
     task: Task,
     motion: Motion,
@@ -296,7 +292,6 @@ def sweep_pair(
         pair: The pair.
         stretch: The intervals.
     """
-    apart()
     rules, rows, runs, plane = task.rules, work.rows, work.runs, work.planes[pair]
     required, group = task.pairs.required[pair], task.pairs.group[pair]
     count, yes_or_no = stretch.size, stretch.yes_or_no

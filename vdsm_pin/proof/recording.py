@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, clock, compiled
+from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.kernels import NEAR, NORMAL, Goal
 from vdsm_pin.geometry.pieces import HALF_SPACE
@@ -44,7 +44,7 @@ def _claim(
     return plane_bound(task.pieces, work.space, node, lost, n)
 
 
-@compiled
+@compiled(inline=False)
 def _shortened(
     task: Task, work: Workspace, row: FloatArray, node: int, n: FloatArray
 ) -> float:
@@ -60,7 +60,6 @@ def _shortened(
     Returns:
         The clearance that the plane proves; [m].
     """
-    apart()
     claim, needed = (
         _claim(task, work, row, node, n),
         task.pairs.required[int(row[PAIR])],
@@ -109,12 +108,11 @@ def _write(
     return count + 1
 
 
-@compiled
+@compiled(inline=False)
 def _write_ranges(
     task: Task, work: Workspace, row: FloatArray, records: FloatArray, count: int
 ) -> int:
     """Write planes for ranges of pieces, as few as the hierarchy allows."""
-    apart()
     pieces, space, pair = task.pieces, work.space, int(row[PAIR])
     lost, needed = task.pairs.lost[pair], task.pairs.required[pair]
     n, nodes = np.zeros(3), space.nodes
@@ -140,7 +138,7 @@ def _write_ranges(
     return count
 
 
-@compiled
+@compiled(inline=False)
 def _write_slice(
     slicing: Slicing, work: Workspace, row: FloatArray, records: FloatArray, count: int
 ) -> int:
@@ -148,7 +146,6 @@ def _write_slice(
 
     The slice is one that `bound_between` proves.
     """
-    apart()
     task = slicing.task
     bound_between(slicing, row)
     pair = int(row[PAIR])
@@ -163,7 +160,7 @@ def _write_slice(
     return _write_ranges(task, work, row, records, count)
 
 
-@compiled
+@compiled(inline=False)
 def _record_pair(
     slicing: Slicing, work: Workspace, row: FloatArray, records: FloatArray, count: int
 ) -> tuple[int, bool]:
@@ -172,7 +169,6 @@ def _record_pair(
     Returns:
         The new count, -1 without room, and whether the interval is proved.
     """
-    apart()
     task, pair = slicing.task, int(row[PAIR])
     row[START], row[END] = 0.0, 1.0
     work.space.out[NORMAL:NEAR] = work.planes[pair, :3]
@@ -190,7 +186,7 @@ def _record_pair(
     return count, True
 
 
-@compiled
+@compiled(inline=False)
 def record(
     task: Task,
     motion: Motion,
@@ -214,7 +210,6 @@ def record(
         the time ended; all its pairs are missing) and the pair that is not proved in
         it, or -1.
     """
-    apart()
     task = borrowed(task)
     motion = borrowed(motion)
     work = borrowed(work)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, HELD, LOST, LOW, OWN, TIME, UP
 from vdsm_pin.proof.plane_bounds import Runs
@@ -115,10 +115,9 @@ def note_upper(
         best[OWN:] = points
 
 
-@compiled
+@compiled(inline=False)
 def _drop_candidates(task: Task, results: Results) -> None:
     """Drop the candidates that can no longer hold the least bound."""
-    apart()
     held, kept = results.candidates, 0
     for k in range(results.tally[HELD]):
         group = task.pairs.group[held.pair[k]]
@@ -129,7 +128,7 @@ def _drop_candidates(task: Task, results: Results) -> None:
     results.tally[HELD] = kept
 
 
-@compiled
+@compiled(inline=False)
 def nominate(
     task: Task, results: Results, pair: int, first: int, lower: FloatArray
 ) -> None:
@@ -142,7 +141,6 @@ def nominate(
         first: First interval of the block.
         lower: Lower bounds of its intervals, shape (count,); [m].
     """
-    apart()
     held, room = results.candidates, results.candidates.lower.size
     least = lower[_least(lower)]
     if results.tally[HELD] == room:
@@ -209,10 +207,9 @@ def note_block(
         nominate(task, results, pair, first, lower)
 
 
-@compiled
+@compiled(inline=False)
 def count_the_rest(results: Results, n_intervals: int) -> None:
     """Count as undecided what the time did not allow to judge of n_intervals."""
-    apart()
     for pair in range(results.counts.shape[0]):
         counts = results.counts[pair]
         left = n_intervals - counts.sum()

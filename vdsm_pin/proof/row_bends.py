@@ -5,7 +5,7 @@ The bounds are those of `bends`, of all intervals of the block at once.
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.motions import Motion, bound_column
 from vdsm_pin.proof.packed_tree import PRISMATIC, REVOLUTE, PackedTree
@@ -49,12 +49,11 @@ def _add_shift(
         out[r] = before[r] + lever * turn[r] * turn[r]
 
 
-@compiled
+@compiled(inline=False)
 def bend_way(
     tree: PackedTree, ways: Ways, rows: Rows, way: int, count: int, straight: bool
 ) -> None:
     """M and W of a way, from those of the way before it."""
-    apart()
     before, joint = rows.ways[ways.before[way]], ways.joint[way]
     own, kind = rows.ways[way], tree.kind[joint]
     turn, turn_before = own[TURN, :count], before[TURN, :count]
@@ -87,12 +86,11 @@ def bend_way(
                 bend[r] += reach[r] * swing[r]
 
 
-@compiled
+@compiled(inline=False)
 def drift_way(
     tree: PackedTree, ways: Ways, erring: FloatArray, rows: Rows, way: int, count: int
 ) -> None:
     """D of a way, from that of the way before it and from W."""
-    apart()
     number, joint = ways.before[way], ways.joint[way]
     before, own = rows.ways[number], rows.ways[way]
     turn, share, stroke = before[TURN], erring[number], erring[way]

@@ -2,7 +2,7 @@
 
 from math import cos, sin
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.packed_tree import PRISMATIC, REVOLUTE, PackedTree
@@ -76,12 +76,11 @@ def _turn_frame(tree: PackedTree, rows: Rows, joint: int, n: int) -> None:
             new[c, along, :n] = old[c, along, :n]
 
 
-@compiled
+@compiled(inline=False)
 def move_frame(
     tree: PackedTree, motion: Motion, rows: Rows, first: int, n: int, joint: int
 ) -> None:
     """The frame of a joint in the rows of a block, from its parent's."""
-    apart()
     parent, column, kind = tree.parent[joint], tree.column[joint], tree.kind[joint]
     values, last = rows.work[5, :n], motion.knots.shape[0] - 1
     ratio, offset = tree.ratio[joint], tree.offset[joint]

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.row_bends import bend_way, bound_joints, drift_way
@@ -30,12 +30,11 @@ FEW_PLACES: Final = 1024
 """Of so many it is not asked which are wanted."""
 
 
-@compiled
+@compiled(inline=False)
 def _bend_places(
     places: Places, errors: WayErrors, rows: Rows, wanted: IntArray, count: int
 ) -> None:
     """How far some places leave their chords, and D where errors turn."""
-    apart()
     turning, straight = errors.any_turn, rows.block[CURVED] == 0
     for place in wanted:
         way, lever = places.way[place], places.lever[place]
@@ -52,12 +51,11 @@ def _bend_places(
                 drift[r] = own[DRIFT, r] + share * turn[r]
 
 
-@compiled
+@compiled(inline=False)
 def _set_places(
     places: Places, ways: Ways, rows: Rows, wanted: IntArray, n: int
 ) -> None:
     """Some places in the frames from which they are seen, those in the world first."""
-    apart()
     for place in wanted:
         way, out = places.way[place], rows.tracks.places[place]
         if place < places.n_points:
@@ -82,10 +80,9 @@ def _see_places(
     _bend_places(places, errors, rows, wanted, count)
 
 
-@compiled
+@compiled(inline=False)
 def _see_corners(task: Task, rows: Rows, corners: IntArray) -> None:
     """The same of a body's corners, and what they stem from, unless it is known."""
-    apart()
     places, known, size, new = task.places, rows.tracks.known, 0, False
     number = rows.block[NUMBER]
     for corner in corners:
@@ -111,13 +108,12 @@ def seen(task: Task, rows: Rows, pair: int) -> Mover:
     return mover
 
 
-@compiled
+@compiled(inline=False)
 def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) -> None:
     """Configurations of rows first .. first + count; the last row may repeat.
 
     Where there are many places none is known yet: `seen` finds those it is asked for.
     """
-    apart()
     tree, ways, errors = task.tree, task.ways, task.errors
     straight = motion.inner.shape[1] == 0
     block = rows.block

@@ -4,7 +4,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, clock, compiled
+from vdsm_pin.compiled import clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NEAR, UPPER
 from vdsm_pin.proof.bends import bend_between
@@ -81,19 +81,17 @@ class Witnesses(NamedTuple):
     limit: float
 
 
-@compiled
+@compiled(inline=False)
 def new_witness() -> Witness:
     """A witness of nothing: infinite bounds."""
-    apart()
     value = np.zeros(4)
     value[MET] = value[INSTANT] = value[KNOWN] = np.inf
     return Witness(value, np.zeros(6))
 
 
-@compiled
+@compiled(inline=False)
 def new_witnesses(n_pairs: int, limit: float) -> Witnesses:
     """Nothing met yet but the least upper bound of all."""
-    apart()
     return Witnesses(
         np.full(n_pairs, np.inf),
         np.zeros(n_pairs, np.int64),
@@ -104,7 +102,7 @@ def new_witnesses(n_pairs: int, limit: float) -> Witnesses:
     )
 
 
-@compiled
+@compiled(inline=False)
 def bound_between(slicing: Slicing, row: FloatArray) -> None:
     """Bound a slice and write the result to row[KEY].
 
@@ -112,7 +110,6 @@ def bound_between(slicing: Slicing, row: FloatArray) -> None:
         slicing: What they are bounded with.
         row: The slice.
     """
-    apart()
     place_pair(slicing, row)
     task, ends, space = slicing.task, slicing.ends, slicing.space
     slice_bound(task, ends, space, int(row[PAIR]), row[END] - row[START])
@@ -134,7 +131,7 @@ def place_pair(slicing: Slicing, row: FloatArray) -> None:
     bend_between(task, motion, ends.bends, way, k, start, end)
 
 
-@compiled
+@compiled(inline=False)
 def _bound_towards(
     slicing: Slicing, row: FloatArray, aim: float, enough: float = np.inf
 ) -> bool:
@@ -150,7 +147,6 @@ def _bound_towards(
     Returns:
         Whether the bound is that of the pair itself.
     """
-    apart()
     place_pair(slicing, row)
     task, ends, space = slicing.task, slicing.ends, slicing.space
     pair, h, missing = int(row[PAIR]), row[END] - row[START], aim - row[KEY]
@@ -171,14 +167,13 @@ def _bound_towards(
     return True
 
 
-@compiled
+@compiled(inline=False)
 def examine(slicing: Slicing, row: FloatArray, t: float, witness: Witness) -> None:
     """Look at one instant of a slice's interval; keeps the least upper bound.
 
     Where that may fall below the least one known it is found as closely as can be, else
     a rough version of the pair may do.
     """
-    apart()
     task, space = slicing.task, slicing.space
     instant = row.copy()
     instant[START] = instant[END] = t
@@ -197,7 +192,7 @@ def examine(slicing: Slicing, row: FloatArray, t: float, witness: Witness) -> No
         witness.value[INSTANT] = min(witness.value[INSTANT], instant[KEY])
 
 
-@compiled
+@compiled(inline=False)
 def split(
     slicing: Slicing,
     row: FloatArray,
@@ -211,7 +206,6 @@ def split(
     Bounds are as good as can be where that decides whether they come up to the aim, or
     to what is enough.
     """
-    apart()
     start, end = row[START], row[END]
     middle = 0.5 * (start + end)
     half = row.copy()
@@ -225,7 +219,7 @@ def split(
     return push(heap, count, half)
 
 
-@compiled
+@compiled(inline=False)
 def resolve(
     slicing: Slicing, heap: FloatArray, row: FloatArray, witness: Witness
 ) -> tuple[int, int]:
@@ -241,7 +235,6 @@ def resolve(
     Returns:
         Verdict and number of slices in the heap.
     """
-    apart()
     task = slicing.task
     required = task.pairs.required[int(row[PAIR])]
     rounding = task.rules.pad + task.rules.goal
@@ -280,7 +273,7 @@ def resolve(
     return verdict, count
 
 
-@compiled
+@compiled(inline=False)
 def tighten(
     slicing: Slicing, heap: FloatArray, count: int, witnesses: Witnesses
 ) -> int:
@@ -295,7 +288,6 @@ def tighten(
     Returns:
         Number of slices in the heap; the first is the least bound.
     """
-    apart()
     task = slicing.task
     row = np.zeros(SLICE)
     least = witnesses.limit

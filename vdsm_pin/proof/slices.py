@@ -4,7 +4,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import Body, body_reach, new_body
 from vdsm_pin.geometry.kernels import (
@@ -59,10 +59,9 @@ class Space(NamedTuple):
     out: FloatArray
 
 
-@compiled
+@compiled(inline=False)
 def new_space(n_turning: int, corners: int) -> Space:
     """Fresh working space for bodies of up to so many corners, and joints that turn."""
-    apart()
     body = new_body(2 * corners, corners, room_of(n_turning))
     core = new_body(0, 0, 0)
     return Space(
@@ -77,7 +76,7 @@ def new_space(n_turning: int, corners: int) -> Space:
     )
 
 
-@compiled
+@compiled(inline=False)
 def plane_bound(
     pieces: PackedPieces, space: Space, node: int, lost: float, n: FloatArray
 ) -> float:
@@ -90,7 +89,6 @@ def plane_bound(
         lost: What every plane of the pair loses; [m].
         n: Unit vector towards the partner, in its frame, shape (3,); [-].
     """
-    apart()
     support = node_support(pieces, node, n, space.stack, space.scratch[0])
     return support - body_reach(space.body, n[0], n[1], n[2]) - lost
 
@@ -167,12 +165,11 @@ def leaf_bound(
     out[LOWER] -= goal.lost
 
 
-@compiled
+@compiled(inline=False)
 def _mesh_bound(
     task: Task, space: Space, root: int, lost: float, sighted: bool, enough: float
 ) -> None:
     """`loaded_bound` for an obstacle of many pieces, by its hierarchy."""
-    apart()
     pieces = task.pieces
     left_out, part = np.inf, 1.0 - EASE * task.rules.slack
     low, high = space.scratch[SCRATCH_ROWS], space.scratch[SCRATCH_ROWS + 1]
@@ -200,7 +197,7 @@ def _mesh_bound(
     out[LOWER] = min(out[LOWER], left_out)
 
 
-@compiled
+@compiled(inline=False)
 def loaded_bound(
     task: Task,
     space: Space,
@@ -220,7 +217,6 @@ def loaded_bound(
             the partner is of many pieces; [m].
         enough: From here on no better bound is looked for, where it is of one; [m].
     """
-    apart()
     pieces, lost = task.pieces, task.pairs.lost[pair]
     root = pieces.root[task.pairs.obstacle[pair]]
     first, last = pieces.node_range[root]
@@ -231,7 +227,7 @@ def loaded_bound(
         _mesh_bound(task, space, root, lost, sighted, ease)
 
 
-@compiled
+@compiled(inline=False)
 def slice_bound(
     task: Task, ends: Ends, space: Space, pair: int, h: float, enough: float = np.inf
 ) -> None:
@@ -247,6 +243,5 @@ def slice_bound(
         h: Length of the slice; 0 for an instant, where `upper` is a true distance.
         enough: As for `loaded_bound`; inf for an instant.
     """
-    apart()
     load_body(task, mover_of(task, pair), ends, space.body, h)
     loaded_bound(task, space, pair, h == 0.0, np.inf, enough)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS, Body
 from vdsm_pin.proof.bends import Bends, new_bends
@@ -114,7 +114,7 @@ def _placed_at(tree: PackedTree, pose: Pose, joint: int, out: FloatArray) -> Non
         out[:] = pose.origins[joint + 1]
 
 
-@compiled
+@compiled(inline=False)
 def _add_turns(
     task: Task, pose: Pose, place: int, share: float, swings: FloatArray
 ) -> tuple[int, float]:
@@ -130,7 +130,6 @@ def _add_turns(
     Returns:
         Number of generators, and the radius of a ball for turns of placements; [m].
     """
-    apart()
     tree, ways, errors = task.tree, task.ways, task.errors
     way = task.places.way[place]
     frame, rest = ways.frame[way], ways.rest[way]
@@ -193,10 +192,9 @@ def load_errors(task: Task, mover: Mover, ends: Ends, loaded: Body, h: float) ->
         loaded.balls[corner] += ball + far + sag
 
 
-@compiled
+@compiled(inline=False)
 def load_body(task: Task, mover: Mover, ends: Ends, loaded: Body, h: float) -> None:
     """A body over a slice and the error box; arguments as for `load_errors`."""
-    apart()
     corners, places, bends = mover.slots.size, task.places, ends.bends
     instants = 2 if h > 0.0 else 1
     loaded.used[0], loaded.used[1] = instants * corners, corners

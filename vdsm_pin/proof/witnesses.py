@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.layouts import AT_UPPER, OTHER, OWN, TIME, UP
 from vdsm_pin.proof.motions import Motion, interpolate
@@ -60,7 +60,7 @@ def witness_at(
         own[c] += share * (other[c] - own[c])
 
 
-@compiled
+@compiled(inline=False)
 def place_witness(
     task: Task, motion: Motion, ends: Ends, pair: int, best: FloatArray
 ) -> None:
@@ -73,7 +73,6 @@ def place_witness(
         pair: The pair.
         best: Its best row with core points; witnesses on return, where there are any.
     """
-    apart()
     if not best[UP] < np.inf:
         return
     mover, own, other = mover_of(task, pair), np.zeros(3), np.zeros(3)
@@ -84,9 +83,8 @@ def place_witness(
     best[OWN:OTHER], best[OTHER:] = own, other
 
 
-@compiled
+@compiled(inline=False)
 def place_best(task: Task, motion: Motion, ends: Ends, best: FloatArray) -> None:
     """The same of all pairs, their best rows of shape (n_pairs, BEST)."""
-    apart()
     for pair in range(best.shape[0]):
         place_witness(task, motion, ends, pair, best[pair])

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, paged_zeros, uncleared
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
@@ -87,21 +87,19 @@ def take_frame(rows: Rows, row: int, frame: int, pose: Pose) -> None:
             pose.frames[frame, c, d] = rows.frames[frame, c, d, row]
 
 
-@compiled
+@compiled(inline=False)
 def take_row(rows: Rows, row: int, pose: Pose) -> None:
     """Write the configuration of one row of a block to a pose."""
-    apart()
     for frame in range(1, pose.origins.shape[0]):
         take_frame(rows, row, frame, pose)
 
 
-@compiled
+@compiled(inline=False)
 def load_rows(task: Task, mover: Mover, work: Workspace, first: int, last: int) -> None:
     """Load a body between two rows of a block; `last` is `first` or next.
 
     Of the ends only what errors ask for is written.
     """
-    apart()
     rows, runs, loaded, ends = work.rows, work.runs, work.space.body, work.ends
     corners, tracks = mover.slots.size, rows.tracks
     instants = 2 if last > first else 1

@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, compiled
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.kernels import BRACKET, FAR, NEAR, UPPER
@@ -19,7 +19,7 @@ from vdsm_pin.proof.swept_bodies import load_disc, local_point, place_point
 from vdsm_pin.proof.terms import Mover, Task, mover_of
 
 
-@compiled
+@compiled(inline=False)
 def _slopes(
     task: Task,
     mover: Mover,
@@ -40,7 +40,6 @@ def _slopes(
         gap: The distance; below zero the points have passed each other; [m].
         slopes: Of the columns of q, shape (n_columns,); added to; [-], [m/rad].
     """
-    apart()
     tree, ways, way = task.tree, task.ways, mover.way
     x, y, z = far[0] - near[0], far[1] - near[1], far[2] - near[2]
     size = sqrt(x * x + y * y + z * z)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, borrowed, compiled
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -125,7 +125,7 @@ def pose_shapes(
     return node[:count], ends[:count], bends[:count]
 
 
-@compiled
+@compiled(inline=False)
 def _pose_all(
     tried: tuple[FloatArray, BoolArray, IntArray, FloatArray, FloatArray],
     limit: float,
@@ -133,7 +133,6 @@ def _pose_all(
     out: tuple[IntArray, FloatArray, FloatArray],
 ) -> int:
     """Write what `pose_shapes` returns; its number of rows is returned."""
-    apart()
     tips, whole, knees, slopes, stations = borrowed(tried)
     node, ends, bends = borrowed(out)
     n_shapes, count = knees.shape[0], 0
