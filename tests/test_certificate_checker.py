@@ -378,6 +378,30 @@ def test_the_order_is_judged_as_the_verifier_judges_it(closed: bool) -> None:
     assert 0.1 < np.mean(verdicts) < 0.9
 
 
+@pytest.mark.parametrize("damage", ["hash", "key", "unended", "more", "end"])
+def test_the_last_line_seals_all_that_is_before_it(damage: str, tmp_path: Path) -> None:
+    """Whatever is written in its place, the rest of the file being as it was."""
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.0]), NO_ERRORS)
+    content = case.certificate.read_bytes()
+    assert judge(case).accepted
+    *body, last = content.splitlines(keepends=True)
+    end = json.loads(last)
+    other = {
+        "hash": json.dumps(end | {"sha256": sha256(b"")}).encode() + b"\n",
+        "key": json.dumps(end | {"more": 1}).encode() + b"\n",
+        "unended": last.rstrip(b"\n"),
+        "more": last + body[-1],
+        "end": json.dumps(end | {"end": False}).encode() + b"\n",
+    }[damage]
+    assert "the last line does not fit" in refused(case, b"".join([*body, other]))
+
+
+def test_what_joins_the_rows_is_known_by_name(tmp_path: Path) -> None:
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.0]), NO_ERRORS)
+    lines = edited(case, lambda found: found[0].update(interpolation="septic"))
+    assert "interpolation is septic, expected one of" in refused(case, sealed(lines))
+
+
 # ---- meshes and their inside ---------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import arb, ctx
+from flint import arb, arb_mat, ctx
 from oracles.certificate_cases import Case
 from oracles.certificate_oracle import frames_and_centres, sealed
 
@@ -21,7 +21,7 @@ from vdsm_pin.certificate_checker.balls import Rejected
 from vdsm_pin.certificate_checker.motion import Branch, Interval, beside
 from vdsm_pin.certificate_checker.program import PRECISION
 from vdsm_pin.certificate_checker.rows import Rows
-from vdsm_pin.certificate_checker.tree import SLIDES, Joint
+from vdsm_pin.certificate_checker.tree import SLIDES, Joint, Tree
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Carrier, Moving, Scene
@@ -370,3 +370,27 @@ def test_a_branch_rests_before_its_first_knot_and_after_its_last() -> None:
     ):
         found = branch.between(start, end)
         assert [[float(q) for q in points] for points in found] == ends
+
+
+@pytest.mark.parametrize("parts", [1, 4])
+def test_a_rail_that_gains_speed_takes_the_tip_off_its_chord(parts: int) -> None:
+    """By (x'' h^2 / 8) of x0 = t^3 over each of the slices of width h."""
+    joint = Joint(0, SLIDES, (1, 0, 0), np.eye(4), (0, 1.0, 0.0))
+    motion = Interval(Tree([joint]), [[arb(0), arb(0), arb(0), arb(1)]])
+    bends: list[float] = []
+    drawing: Any = SimpleNamespace(
+        point=lambda station: arb_mat([[station], [0], [0]]),
+        visit=lambda *_: arb(0),
+        local=lambda station: station,
+        step=lambda low, high: high - low,
+        draw=lambda *taken: bends.append(float(taken[3])),
+    )
+    rows = SimpleNamespace(
+        rows=SimpleNamespace(path_m=np.array([0.0, 1.0]), on_path=np.ones(2, bool)),
+        problem=SimpleNamespace(tip_tolerance=1e-9),
+        ordered=True, link=1, last=0.0, _look=lambda *_: None,
+    )  # fmt: skip
+    ends = np.arange(parts + 1) / parts
+    tips = [arb_mat([[arb(t) ** 3], [0], [0]]) for t in ends.tolist()]
+    Rows._draw(rows, drawing, (0, 1), motion, tips)  # type: ignore[arg-type]
+    assert bends == pytest.approx(6.0 * ends[1:] / (8.0 * parts**2), rel=1e-9)

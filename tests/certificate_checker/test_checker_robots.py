@@ -20,9 +20,10 @@ from oracles.random_robots import MESH, random_urdf
 from oracles.robot_certificates import BASES, CELL, VIRTUAL, Made, cell, text
 
 from vdsm_pin.certificate_checker.balls import SLACK, Rejected
-from vdsm_pin.certificate_checker.robot import Model, within
+from vdsm_pin.certificate_checker.robot import Model, Robot, within
 from vdsm_pin.certificate_checker.tree import Tree
 from vdsm_pin.cli import main
+from vdsm_pin.problem.error_boxes import ErrorBox, JointError
 from vdsm_pin.robots.files import MeshCover, RobotFiles
 from vdsm_pin.robots.urdf import read_robot
 
@@ -287,6 +288,43 @@ def test_the_extent_of_a_link_is_that_of_all_it_is_worked_out_of(
     (found,) = Model(files, np.eye(4)).links()
     told = {"l": {"order": [], "meshes": [BALL]}} if cover == "primitives" else {}
     assert found(told).extent == pytest.approx(extent, rel=1e-12)
+
+
+def test_errors_of_every_joint_are_those_of_its_unit(tmp_path: Path) -> None:
+    """Radians of what turns and metres of what slides; the larger one of two counts."""
+    made = Made(tmp_path)
+    model = Model(RobotFiles(made.folder / "all.urdf"), np.eye(4))
+    named = (JointError("bend", turn=0.03), JointError("lift", shift=0.001))
+    found = model.least_errors(ErrorBox(joint=0.01, slide=0.002, named=named))
+    assert found == {
+        "joints_rad": {"turn": 0.01, "bend": 0.03},
+        "joints_m": {"lift": 0.002},
+    }
+
+
+def test_link_pairs_left_out_are_counted(tmp_path: Path) -> None:
+    """Of three links in a row two are neighbours twice, and left out without a SRDF."""
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    links = "".join(f'<link name="{name}">{ball}</link>' for name in "abc")
+    joints = "".join(
+        f'<joint name="j{child}" type="continuous"><parent link="{parent}"/>'
+        f'<child link="{child}"/><origin xyz="1 0 0"/></joint>'
+        for parent, child in ("ab", "bc")
+    )
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joints}</robot>')
+    model = Model(RobotFiles(tmp_path / "r.urdf"), np.eye(4))
+    told: Any = {}
+    robot: Any = Robot.__new__(Robot)
+    robot.model, robot.tree, robot.notes = model, model.tree, []
+    robot.links = {x.name: (x.frame, x(told)) for x in model.links()}
+    robot.scene = SimpleNamespace(obstacles=[])
+    robot.rests = []
+    stated = {"joints_rad": {"jb": 0.0, "jc": 0.0}, "joints_m": {}}
+    stated |= {"base": [0.0, 0.0], "obstacles": {}}
+    file: Any = SimpleNamespace(errors=lambda _: ErrorBox(), required=(0.1, 0.1))
+    pairs = [*robot._pairs(file, {"errors": stated}, [])]
+    assert [{*pair.names} for pair in pairs] == [{"a", "c"}]
+    assert robot.notes == ["2 of 3 link pairs left out"]
 
 
 def test_a_mesh_of_a_link_is_in_the_unit_that_its_file_states(tmp_path: Path) -> None:
