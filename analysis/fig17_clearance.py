@@ -19,7 +19,8 @@ from vdsm_pin.units import MM_PER_M
 
 NAME = "fig17"
 SCENES = tuple(AXES)
-WIDTH, HEIGHT = 3.20, 1.10  # of one panel; [inch]
+WIDTH, HEIGHT = 3.14, 1.10  # of one panel; [inch]
+GAP = 0.36  # room for the numbers of the right panel; [inch]
 TOP_AXIS = 900.0  # [mm]
 SURFACE = (1.0, 1_000.0)  # ends of the logarithmic axis; [mm]
 END = 0.9  # numbers farther right would touch the next panel's first; [-]
@@ -40,7 +41,7 @@ def _figure(runs: Runs, painter: Callable[[Axes, Run], None], quantity: str) -> 
     for k, scene in enumerate(SCENES):
         low = 0.36 + (len(SCENES) - 1 - k) * pitch
         for r, strategy in enumerate(STRATEGIES):
-            left = 0.44 + r * (WIDTH + 0.24)
+            left = 0.44 + r * (WIDTH + GAP)
             axes = style.place(figure, left, low, WIDTH, HEIGHT)
             painter(axes, runs(scene, strategy))
             letter = "abcdefgh"[2 * k + r]

@@ -20,8 +20,9 @@ TURNS: Final = 24
 ROOM: Final = 7.0
 """Free space beyond this makes a place no better; [pt]."""
 
-LED: Final = 12.0
-"""From this distance on, a thin line leads from a dot to its label; [pt]."""
+LED: Final = 10.5
+"""From this distance on, a thin line leads from a dot to its label, between two of those
+above: rounding does not decide; [pt]."""
 
 COVERED: Final = 5.0
 """How much more a point of overlap counts than one of distance; [-]."""
