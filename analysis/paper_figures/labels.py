@@ -21,8 +21,10 @@ ROOM: Final = 7.0
 """Free space beyond this makes a place no better; [pt]."""
 
 LED: Final = 10.5
-"""From this distance on, a thin line leads from a dot to its label, between two of those
-above: rounding does not decide; [pt]."""
+"""From this distance on, a thin line leads from a dot to its label; [pt].
+
+Between two of `RADII`: rounding does not decide.
+"""
 
 COVERED: Final = 5.0
 """How much more a point of overlap counts than one of distance; [-]."""
