@@ -127,3 +127,17 @@ def test_a_drawing_keeps_its_scale_and_escapes_its_words() -> None:
     assert "a<b" in root.xpath("//text()")
     at = [(float(c.get("cx")), float(c.get("cy"))) for c in root.iter("circle")]
     assert at[1][0] - at[0][0] == pytest.approx(2.0 * (at[0][1] - at[2][1]), abs=0.2)
+
+
+def test_the_page_says_no_more_of_the_clearance_than_is_proved(tmp_path: Path) -> None:
+    problem = read_problem("paper/obs1")
+    page, _ = explain_to_folder(problem, 458, tmp_path / "out")
+    text = page.read_text(encoding="utf-8")
+    proved = plan_and_verify(problem, "paper").verification.min_clearance
+    (told,) = re.findall(r"([0-9.]+) mm proved between the surfaces", text)
+    assert 1e3 * proved - 1e-3 < float(told) <= 1e3 * proved
+    rows = re.findall(r">link \d</td>(.*?)</tr>", text)
+    cells = [re.findall(r">([0-9.]+)<", row) for row in rows]
+    assert len(cells) == 8
+    for _, lower, upper in cells:
+        assert float(lower) < float(upper)  # rounded apart

@@ -62,12 +62,18 @@ def quantity(value: float | None, unit: str, whole: Whole | None = None) -> str:
     return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
 
 
-def measured(value: float | None, unit: str) -> str:
+def measured(value: float | None, unit: str, whole: Whole | None = None) -> str:
     """The same of a length or an angle of the motion, where rounding noise is zero."""
     if value is None or isnan(value):
         return MISSING
     factor, _ = _DISPLAY_UNITS.get(unit, (1.0, ""))
-    return quantity(value if abs(value) * factor >= _SMALLEST_FIXED else 0.0, unit)
+    shown = value if abs(value) * factor >= _SMALLEST_FIXED else 0.0
+    return quantity(shown, unit, whole)
+
+
+def measured_at_most(value: float, unit: str) -> str:
+    """The same rounded up: an error is not told to be smaller than it was."""
+    return measured(value, unit, ceil)
 
 
 def percent(share: float | None) -> str:

@@ -180,8 +180,11 @@ def test_a_folder_holds_what_the_verifier_takes(
     assert len(record[0].split(",")) == 1 + 17 + 17 + 24
     assert len(record) == executed.n_samples + 1
     less = told.executed.model_copy(update={"min_clearance_m": 0.0101369})
-    show_simulation(told.model_copy(update={"executed": less}), tmp_path)
-    assert "10.136 mm" in capsys.readouterr().out  # what is proved is rounded down
+    told = told.model_copy(update={"executed": less, "largest_error_rad": 0.00101641})
+    show_simulation(told, tmp_path)
+    shown = capsys.readouterr().out
+    assert "10.136 mm" in shown  # what is proved is rounded down
+    assert "0.059°" in shown  # and 0.05824° up
 
 
 def test_places_on_a_path_are_not_asked_for_where_there_is_none(

@@ -47,6 +47,7 @@ from vdsm_pin.units import (
     MISSING,
     MM_PER_M,
     measured,
+    measured_at_most,
     percent,
     percent_at_most,
     quantity,
@@ -92,7 +93,7 @@ def _environment() -> jinja2.Environment:
     )
     filters = [quantity, depth, at_least, at_most, check_cells, limit, percent,
                percent_at_most,
-               errors, outcome, mean_count, measured, survived,
+               errors, outcome, mean_count, measured, measured_at_most, survived,
                lost, kept_at_least, counted, term, place, assumption, point, css_text,
                scene_words, sentence]  # fmt: skip
     environment.filters |= {one.__name__: one for one in filters}

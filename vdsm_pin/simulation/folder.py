@@ -25,7 +25,7 @@ from vdsm_pin.simulation.page import BAND_DEG, page
 from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.text import printable
-from vdsm_pin.units import measured, percent, percent_at_most
+from vdsm_pin.units import measured_at_most, percent, percent_at_most
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.inside import located
 from vdsm_pin.verification.judgement import BestEffort, judge_clearance
@@ -228,8 +228,8 @@ def show_simulation(file: SimulationFile, folder: Path) -> None:
         ("duration", f"{file.duration_s:.1f} s"),
         ("clearance planned", at_least(file.planned.min_clearance_m)),
         ("clearance executed", at_least(file.executed.min_clearance_m)),
-        ("largest joint error", measured(file.largest_error_rad, "rad")),
-        ("largest base error", measured(file.largest_base_error_m, "m")),
+        ("largest joint error", measured_at_most(file.largest_error_rad, "rad")),
+        ("largest base error", measured_at_most(file.largest_base_error_m, "m")),
         ("any motion within these errors", file.within_error_box.verdict),
         ("joints within ±0.3°", percent(file.within_band_share)),
         ("largest tension", f"{math.ceil(file.largest_tension_n)} N"),

@@ -14,6 +14,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import rendered
+from vdsm_pin.report.words import at_least, at_most
 from vdsm_pin.verification.coal_arm import CoalArm
 from vdsm_pin.verification.pinocchio_arm import load_arm
 
@@ -90,11 +91,12 @@ def _checks(found: Refinement, row: int) -> Part:
     error = float(np.linalg.norm(centres - plan.centres[row], axis=1).max())
     arm, rows = CoalArm(problem, links=False), []
     for seen in arm.near(one, np.inf):
-        rows += [
-            (*arm.pairs.named(pair), mm(seen.distance[k]), mm(low), mm(seen.upper[k]))
-            for k, (pair, low) in enumerate(zip(seen.pair, seen.lower, strict=True))
-        ]
-    head = ("link", "obstacle", "by Coal [mm]", "proved at least", "proved at most")
+        for k, (pair, low) in enumerate(zip(seen.pair, seen.lower, strict=True)):
+            bounds = at_least(float(low)), at_most(float(seen.upper[k]))
+            proved = [bound.removesuffix(" mm") for bound in bounds]
+            rows.append((*arm.pairs.named(pair), mm(seen.distance[k]), *proved))
+    head = ("link", "obstacle", "by Coal [mm]", "proved at least [mm]",
+            "proved at most [mm]")  # fmt: skip
     return Part(
         "Checked",
         "section 6.3, Eq. 22–24",
@@ -102,8 +104,8 @@ def _checks(found: Refinement, row: int) -> Part:
             f"Pinocchio's joint centres for these angles are within {error:.1e} m of "
             "those of Step 6.",
             f"The whole motion is {found.verification.verdict.value}: "
-            f"{mm(found.verification.min_clearance)} mm proved between the surfaces at "
-            "every instant."
+            f"{at_least(found.verification.min_clearance)} proved between the "
+            "surfaces at every instant."
             if problem.scene.obstacles
             else f"The whole motion is {found.verification.verdict.value}.",
         ),
