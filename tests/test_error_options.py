@@ -14,6 +14,8 @@ from vdsm_pin.cli import app
 from vdsm_pin.cli.options import ErrorOptions
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.problem import error_boxes
+from vdsm_pin.report.facts import error_box
+from vdsm_pin.report.words import errors
 
 TEXT = """vdsm_problem: 1
 name: errors
@@ -46,6 +48,23 @@ def test_options_and_python_say_the_same() -> None:
     assert crate.shift == 0.0025 and crate.turn == radians(0.5)
     assert typed.of_obstacle("other").shift == 0.001
     assert ErrorOptions("0.1").box().angles(2).max() == radians(0.1)
+
+
+def test_an_error_stated_twice_is_told_once_and_the_larger_counts() -> None:
+    file = vp.ErrorBox(
+        joint_deg={"J": 1.0}, obstacles_mm={"crate": 1.0}, obstacles_deg={"crate": 3.0}
+    )
+    options = vp.ErrorBox(
+        joint_deg={"J": 2.0, "K": 1.0}, obstacles_mm={"crate": 2.0, "a": 1.0}
+    )
+    for box in (file.widened(options), options.widened(file)):
+        words = errors(error_box(box)).split(", ")
+        assert sorted(words) == [
+            "1.000 mm of a",
+            "2.000 mm and 3.000° of crate",
+            "±1.000° of K",
+            "±2.000° of J",
+        ]
 
 
 @pytest.mark.parametrize(

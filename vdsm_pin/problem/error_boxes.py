@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 from itertools import zip_longest
 from numbers import Real
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -47,6 +47,9 @@ class JointError:
     name: str
     turn: float = 0.0
     shift: float = 0.0
+
+
+_Named = TypeVar("_Named", ObstacleError, JointError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,9 +161,19 @@ class ErrorBox:
         return ErrorBox(
             **plain,
             joints=tuple((max(a[0], b[0]), max(a[1], b[1])) for a, b in both),
-            obstacles=tuple(dict.fromkeys((*self.obstacles, *other.obstacles))),
-            named=tuple(dict.fromkeys((*self.named, *other.named))),
+            obstacles=_largest((*self.obstacles, *other.obstacles)),
+            named=_largest((*self.named, *other.named)),
         )
+
+
+def _largest(errors: Sequence[_Named]) -> tuple[_Named, ...]:
+    """Each name once, with the largest shift and turn that are stated of it."""
+    largest: dict[str, _Named] = {}
+    for one in errors:
+        known = largest.get(one.name, one)
+        shift, turn = max(known.shift, one.shift), max(known.turn, one.turn)
+        largest[one.name] = replace(one, shift=shift, turn=turn)
+    return tuple(largest.values())
 
 
 PLAIN: Final[Mapping[str, str]] = MappingProxyType(

@@ -198,10 +198,9 @@ def errors(box: "ErrorBoxRow") -> str:
         unit = "rad" if joint.turn_rad else "m"
         parts += [f"±{quantity(size, unit)} of {joint.name}"] if size else []
     for one in box.obstacles:
-        parts.append(
-            f"{quantity(one.shift_m, 'm')} and {quantity(one.turn_rad, 'rad')} "
-            f"of {one.name}"
-        )
+        sizes = (one.shift_m, "m"), (one.turn_rad, "rad")
+        stated = [quantity(size, unit) for size, unit in sizes if size]
+        parts += [f"{' and '.join(stated)} of {one.name}"] if stated else []
     return ", ".join(parts)
 
 
