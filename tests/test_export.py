@@ -114,6 +114,12 @@ def test_a_motion_plays_evenly_by_what_moves_most_and_by_its_own_times() -> None
     drawing = ArmDrawing(task, rows)
     speed = most / np.diff(play_times(drawing, np.arange(60.0), 7.0))
     np.testing.assert_allclose(speed, speed[0], rtol=1e-4)
+    times = np.linspace(3.0, 8.0, 60) ** 2
+    timed = ArmDrawing(task, replace(rows, times=times))
+    played = play_times(timed, np.arange(60.0))
+    np.testing.assert_allclose(played, times - times[0], rtol=1e-12)
+    played = play_times(timed, np.arange(60.0), 7.0)
+    np.testing.assert_allclose(played, (times - 9.0) * 7.0 / 55.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -125,6 +131,7 @@ def test_a_motion_plays_evenly_by_what_moves_most_and_by_its_own_times() -> None
         (["--out", "a.mp4"], "an MP4 needs ffmpeg: 'nothing' is not installed"),
         (["--out", "near.yaml"], "ends in none of"),
         (["--out", "a.glb", "--moment", "3"], "--moment has no meaning with .glb"),
+        (["--out", "a.glb", "--moment", "0"], "--moment has no meaning with .glb"),
         (["--out", "a.GLB", "--look", "side"], "--look has no meaning with .glb"),
         (["--out", "a.glb", "--width", "99"], "--width has no meaning with .glb"),
         (["--out", "a.png", "--seconds", "3"], "--seconds has no meaning with .png"),
@@ -148,6 +155,15 @@ def test_what_cannot_be_exported_is_one_message(
     assert said in told
     assert told.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["near.yaml"]
+
+
+@pytest.mark.parametrize("seconds", ["inf", "nan", "0", "1e6"])
+def test_a_motion_plays_for_some_time(seconds: str, tmp_path: Path) -> None:
+    file = str(write_problem(tmp_path / "near.yaml", NEAR))
+    with pytest.raises(SystemExit) as ended:
+        main(["export", file, "--out", str(tmp_path / "a.glb"), "--seconds", seconds])
+    assert ended.value.code == 2
+    assert not (tmp_path / "a.glb").exists()
 
 
 def test_glb_is_written_without_a_browser(
@@ -221,7 +237,7 @@ def test_gltf_moves_a_robot_s_links_as_pinocchio_does(
         rates = np.gradient(motion.q, axis=0)
         motion = replace(motion, times=times, rates=rates)
     drawing = RobotDrawing(cell, motion.path)
-    content, binary = opened(glb(drawing, 9.0))
+    content, binary = opened(glb(drawing))
     model = pinocchio.buildModelFromUrdf(str(tmp_path / "cell" / "robot.urdf"))
     data, moments = model.createData(), drawing.told_moments()
     names = [node["name"] for node in content["nodes"]]
@@ -230,7 +246,7 @@ def test_gltf_moves_a_robot_s_links_as_pinocchio_does(
     for channel in played["channels"]:
         sampler = played["samplers"][channel["sampler"]]
         clock = array(content, binary, sampler["input"])[:, 0]
-        assert clock[-1] == pytest.approx(motion.path.n_intervals if smooth else 9.0)
+        assert clock[-1] == pytest.approx(motion.path.n_intervals if smooth else 10.0)
         name, path = names[channel["target"]["node"]], channel["target"]["path"]
         found.setdefault(name, {})[path] = array(content, binary, sampler["output"])
     assert found.keys() == {body.name for body in cell.robot.bodies}
@@ -269,7 +285,7 @@ required_clearance: 5
     problem = read_problem(file)
     none, angles = np.zeros(n), np.zeros((2, n, 2))
     rows = Trajectory(none > 0, none, none, *angles, times=np.linspace(0.0, 4.0, n))
-    content, binary = opened(glb(ArmDrawing(problem, rows), 1.0))
+    content, binary = opened(glb(ArmDrawing(problem, rows)))
     (motion,) = content["animations"]
     numbers = [k for k, node in enumerate(content["nodes"]) if node["name"] == "ball"]
     for channel in motion["channels"]:

@@ -595,6 +595,7 @@ def test_a_problem_file_names_a_robot(
         ("plan", problem),
         ("verify", problem, "--trajectory", rows, "--all-pairs"),
         ("verify", problem, "--trajectory", rows, "--lock", "a=1"),
+        ("verify", problem, "--trajectory", rows, "--required-clearance-mm", "0"),
     ):
         assert run(*words, "--out", out) == 2
     said = capsys.readouterr().err.splitlines()
@@ -602,6 +603,7 @@ def test_a_problem_file_names_a_robot(
     assert "expected manipulator" in said[0]
     assert "--all-pairs has no meaning with a robot" in said[1]
     assert "--lock has no meaning with a problem" in said[2]
+    assert "--required-clearance-mm has no meaning with a problem" in said[3]
 
 
 def test_a_base_moves_the_robot_in_the_scene(tmp_path: Path) -> None:

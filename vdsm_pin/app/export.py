@@ -17,9 +17,6 @@ from vdsm_pin.report.gltf import glb, play_times
 from vdsm_pin.report.html import view_page
 
 ENDINGS: Final = (".glb", ".png", ".mp4")
-SECONDS: Final = 10.0
-"""Length of a motion that states no times; [s]."""
-
 MOST_SECONDS: Final = 120.0
 """Of a film; [s]."""
 
@@ -33,7 +30,7 @@ class ExportOrder:
         trajectory: The motion; None for the arm at the start.
         out: The file; its ending says what it is.
         moment: Which moment a picture shows, in waypoints.
-        seconds: How long it plays; None: as the trajectory's times say, or `SECONDS`.
+        seconds: How long it plays; None: as the trajectory's times say, or 10 s.
         shot: How to look.
     """
 
@@ -56,7 +53,7 @@ def export(order: ExportOrder) -> None:
     with atomic_path(order.out) as file:
         match order.out.suffix.lower():
             case ".glb":
-                file.write_bytes(glb(shown, order.seconds or SECONDS))
+                file.write_bytes(glb(shown, order.seconds))
             case ".png":
                 moment = _within(order.moment, shown)
                 (one,) = pictures(
@@ -92,9 +89,7 @@ def _within(moment: float, shown: Drawing) -> float:
 def _moments(shown: Drawing, seconds: float | None) -> list[float]:
     """The moment of each frame of a film, in waypoints."""
     rows = np.arange(float(shown.trajectory.n_samples))
-    times = play_times(shown, rows, SECONDS)
-    if seconds is not None and times[-1] > 0.0:
-        times = times * (seconds / times[-1])
+    times = play_times(shown, rows, seconds)
     if times[-1] > MOST_SECONDS:
         message = (
             f"a film of {times[-1]:.0f} s is longer than {MOST_SECONDS:.0f} s; "

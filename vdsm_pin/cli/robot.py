@@ -141,10 +141,14 @@ class RobotOptions(NamedTuple):
 def refuse_beside(what: str, options: Mapping[str, object]) -> None:
     """Refuse options that mean nothing beside another one.
 
+    Args:
+        what: The other one, or what is asked about.
+        options: By name; None or False where they were not given.
+
     Raises:
         InvalidInput: If one is given.
     """
     for name, value in options.items():
-        if value:
+        if value is not None and value is not False:
             message = f"{name} has no meaning with {what}"
             raise InvalidInput(message)

@@ -79,17 +79,20 @@ def export(
     ],
     trajectory: ShownMotion = None,
     moment: Annotated[
-        float,
+        float | None,
         typer.Option(
-            min=0.0, metavar="WAYPOINT", help="Of a .png; 12.5 is between two."
+            min=0.0,
+            metavar="WAYPOINT",
+            help="Of a .png; 12.5 is between two; 0 by default.",
         ),
-    ] = 0.0,
+    ] = None,
     seconds: Annotated[
         float | None,
         typer.Option(
             min=0.1,
+            max=86400.0,
             metavar="SECONDS",
-            help="How long it plays; 10, or as the trajectory's times say.",
+            help="How long it plays; as the trajectory's times say, or 10.",
         ),
     ] = None,
     look: Annotated[
@@ -135,5 +138,5 @@ def export(
     asked = read_problem_or_cell(problem)
     if look == "tip" and not isinstance(asked, PlanningProblem):
         refuse_beside("a robot", {"--look tip": look})
-    write(ExportOrder(asked, trajectory, out, moment, seconds, shot))
+    write(ExportOrder(asked, trajectory, out, moment or 0.0, seconds, shot))
     answer.tell(f"wrote {out}", file=out)

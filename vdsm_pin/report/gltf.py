@@ -25,12 +25,16 @@ _Y_UP: Final = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
 _GLASS: Final = 0.42
 
 
-def glb(drawing: Drawing, seconds: float) -> bytes:
+SECONDS: Final = 10.0
+"""Length of a motion that states no times; [s]."""
+
+
+def glb(drawing: Drawing, seconds: float | None = None) -> bytes:
     """The bytes of a .glb file.
 
     Args:
         drawing: Arm or robot, motion, scene and desired path.
-        seconds: How long it plays where it has no times of its own; [s].
+        seconds: How long it plays, see `play_times`; [s].
     """
     file, problem, moments = _File(), drawing.problem, _told(drawing)
     clock = file.times(play_times(drawing, moments, seconds))
@@ -48,23 +52,29 @@ def glb(drawing: Drawing, seconds: float) -> bytes:
     return file.packed(root)
 
 
-def play_times(drawing: Drawing, moments: FloatArray, seconds: float) -> FloatArray:
+def play_times(
+    drawing: Drawing, moments: FloatArray, seconds: float | None = None
+) -> FloatArray:
     """When each moment is reached, from 0, shape (n,); [s].
 
-    By the motion's own times, else so that the link that moves most moves evenly.
+    In proportion to the motion's own times, else so that the link that moves most moves
+    evenly.
 
     Args:
         drawing: The motion.
         moments: In waypoints, rising, shape (n,).
-        seconds: How long it plays where it has no times; [s].
+        seconds: How long it plays; None: as its times say, without them `SECONDS`; [s].
     """
     times = drawing.trajectory.times_at(moments)
-    if times is not None:
-        return np.asarray(times - times[0])
-    ways = np.diff(drawing.points(moments), axis=0)
-    steps = np.linalg.norm(ways, axis=2).max(axis=1, initial=0.0)
-    way = np.append(0.0, np.cumsum(steps + 1e-9))
-    return np.asarray(seconds * way / max(way[-1], 1e-9))
+    if times is None:
+        ways = np.diff(drawing.points(moments), axis=0)
+        steps = np.linalg.norm(ways, axis=2).max(axis=1, initial=0.0)
+        times = np.append(0.0, np.cumsum(steps + 1e-9))
+        seconds = SECONDS if seconds is None else seconds
+    way = times - times[0]
+    if seconds is None or not way[-1]:
+        return np.asarray(way)
+    return np.asarray(way * (seconds / way[-1]))
 
 
 def _told(drawing: Drawing) -> FloatArray:
