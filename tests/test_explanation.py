@@ -117,6 +117,16 @@ def test_what_cannot_be_explained_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "explain.html").exists()
 
 
+def test_a_problem_without_a_path_has_nothing_to_explain(tmp_path: Path) -> None:
+    file = tmp_path / "reach.yaml"
+    goal = "start: [5000, 0, 0]\ngoal: {tip: [5000, 300, 200]}\n"
+    arm = "length_unit: mm\nmanipulator: hrm8\nrequired_clearance: 5\n"
+    file.write_text(f"vdsm_problem: 1\n{arm}{goal}", encoding="utf-8")
+    with pytest.raises(InvalidInput, match="has no tip_path"):
+        explain_to_folder(read_problem(str(file)), None, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_drawing_keeps_its_scale_and_escapes_its_words() -> None:
     made = Canvas(np.array([[0.0, 0.0], [2.0, 1.0]]), "y", "z")
     made.dot(np.zeros(2), "joint", "a<b")

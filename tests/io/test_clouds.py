@@ -60,6 +60,8 @@ FILES = {
     "a.xyz": lines(POINTS),
     "b.txt": b"# remark\n\n" + lines(POINTS, "\t") + b"// more\n",
     "c.csv": b"x,y,z\n" + lines(POINTS, ", "),
+    "quoted.csv": b'"x","y","z"\n' + lines(POINTS, ","),
+    "quotes.csv": b'"x","y","z"\n' + lines(POINTS, ",").replace(b"100.0", b'"100.0"'),
     "mac.xyz": (lines(POINTS[:1]) + b"# one\n" + lines(POINTS[1:])).replace(
         b"\n", b"\r"
     ),

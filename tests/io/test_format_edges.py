@@ -156,6 +156,15 @@ def test_indices_of_glb_beyond_whole_triangles_are_left(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found, [CORNERS])
 
 
+@pytest.mark.parametrize("offset", [0, 10**6])
+def test_an_accessor_of_nothing_needs_no_bytes(offset: int, tmp_path: Path) -> None:
+    def change(document: dict[str, Any]) -> None:
+        document["accessors"][0] |= {"count": 0, "byteOffset": offset}
+
+    with pytest.raises(InvalidFile, match="has no triangle"):
+        read_mesh(write(tmp_path, "a.glb", glb(change)))
+
+
 def test_whole_numbers_of_glb_are_shares_where_they_are_said_to_be(
     tmp_path: Path,
 ) -> None:
@@ -211,6 +220,14 @@ def test_faces_of_dae_with_too_few_corners_are_left_out(
     root = f"<polylist>{INPUT}{faces}</polylist>"
     mesh = read_mesh(write(tmp_path, "a.dae", dae(HERE, root=root)))
     assert len(mesh.triangles) == count
+
+
+@pytest.mark.parametrize("before", ['offset="0"/>', 'stride="3"', 'count="4" st'])
+def test_numbers_of_dae_are_not_left_blank(before: str, tmp_path: Path) -> None:
+    name, _, rest = before.split('"')
+    text = dae(HERE).replace(before, f'{name}""{rest}', 1)
+    with pytest.raises(InvalidFile, match="where numbers are meant"):
+        read_mesh(write(tmp_path, "a.dae", text))
 
 
 @pytest.mark.parametrize("counts", ["-1 4", "4 -1", "3 1", "2"])

@@ -134,7 +134,7 @@ def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
     rows, commas, announced = [], set[int](), ""
     for number, whole in enumerate(data.decode("latin-1").split("\n"), 1):
         line = whole.partition("#")[0].partition("//")[0].strip()
-        words = _BETWEEN.split(line)
+        words = [word.strip('"') for word in _BETWEEN.split(line)]
         mixed = "," in line and _DECIMAL_COMMA.search(line.encode())
         if mixed:
             problem = "has commas inside numbers, expected decimal points"
@@ -147,7 +147,7 @@ def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
             raise stream.invalid(problem, line=number)
         if title:
             announced = words[0] if words[0].isdecimal() else ""
-            _check_title(stream, [word.strip('"').lower() for word in words])
+            _check_title(stream, [word.lower() for word in words])
         elif words != [""]:
             rows.append(stream.numbers(words[:3], 3, number))
     if announced and announced.lstrip("0") != str(len(rows)).lstrip("0"):

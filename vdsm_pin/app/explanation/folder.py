@@ -35,9 +35,11 @@ def explain_to_folder(
         The page and its waypoint.
 
     Raises:
-        InvalidInput: If there is no such waypoint or the folder cannot be written.
+        InvalidInput: If there is no such waypoint, no path of the tip, or the folder
+            cannot be written.
         Infeasible: If the paper's rule has no plan.
     """
+    assert problem.path  # or it says that there is nothing to draw
     check_output_folder(folder)
     check_kept([folder / PAGE], problem.files)
     if problem.scene.moving:

@@ -191,7 +191,7 @@ class _Reader:
         """Where vertex numbers stand among those of a corner, how many there are."""
         offset, stride, vertices = -1, 1, np.zeros((0, 3))
         for one in _children(faces, "input"):
-            place = int(self._ints(one.get("offset", "0"))[0])
+            place = self._int(one.get("offset", "0"))
             stride = max(stride, place + 1)
             if one.get("semantic") == "VERTEX":
                 offset, vertices = place, self._vertices(self._named(one, "source"))
@@ -212,9 +212,9 @@ class _Reader:
                 array = self._named(accessor, "source")
                 values = self._floats(array.text or "")
                 names = [param.get("name") for param in _children(accessor, "param")]
-                stride = int(self._ints(accessor.get("stride", "1"))[0])
-                start = int(self._ints(accessor.get("offset", "0"))[0])
-                count = int(self._ints(accessor.get("count", "0"))[0])
+                stride = self._int(accessor.get("stride", "1"))
+                start = self._int(accessor.get("offset", "0"))
+                count = self._int(accessor.get("count", "0"))
                 if (
                     names != ["X", "Y", "Z"]
                     or stride < 3
@@ -238,6 +238,9 @@ class _Reader:
 
     def _floats(self, text: str, count: int | None = None) -> FloatArray:
         return np.array(self._numbers(text, float, count), dtype=np.float64)
+
+    def _int(self, text: str) -> int:
+        return int(self._numbers(text, int, 1)[0])
 
     def _ints(self, text: str) -> IntArray:
         return np.array(self._numbers(text, int, None), dtype=np.int64)

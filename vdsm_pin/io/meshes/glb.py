@@ -255,12 +255,14 @@ class _Reader:
         if view.buffer != 0 or self._at("buffers", 0).uri or view.extensions:
             problem = "has data in another file or compressed, which is not read"
             raise self._stream.invalid(problem)
+        if not accessor.count:
+            return np.zeros((0, width))
         kind = _NUMBERS[accessor.componentType]
         size = width * kind.itemsize
         stride, start = view.byteStride or size, view.byteOffset + accessor.byteOffset
         end = accessor.byteOffset + stride * (accessor.count - 1) + size
         whole = view.byteOffset + view.byteLength <= len(self._data)
-        if accessor.count and not (whole and end <= view.byteLength and stride >= size):
+        if not (whole and end <= view.byteLength and stride >= size):
             problem = f"accessors[{number}] promises {accessor.count} values, too many"
             raise self._stream.invalid(problem)
         shaped = np.ndarray(
