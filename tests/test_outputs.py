@@ -19,7 +19,7 @@ from vdsm_pin.batch.run import OWN, Batch, run_batch, seconds_of
 from vdsm_pin.batch.task import MANIFEST, TIMING, Settings, Task
 from vdsm_pin.batch.worker import perform
 from vdsm_pin.cli import main
-from vdsm_pin.errors import InvalidFile, OutOfTime
+from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime
 
 PROBLEM = """\
 vdsm_problem: 1
@@ -172,7 +172,7 @@ def test_a_trajectory_that_changes_meanwhile_gets_no_result(
 def test_results_that_stay_are_called_those_of_an_earlier_run(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of a plan and of a verification that come to nothing."""
+    """Of a plan, a verification and a repair that come to nothing."""
     text = (here / "problem.yaml").read_text()
     assert run("plan", "problem.yaml", "--out", "out") == 0
     verify = ["verify", "problem.yaml", "--trajectory", "motion.csv", "--out", "out"]
@@ -193,6 +193,14 @@ def test_results_that_stay_are_called_those_of_an_earlier_run(
 
     monkeypatch.setattr("vdsm_pin.app.arm_subject.verify", late)
     assert run(*verify) == 1
+    assert "out/verification.json is of an earlier run" in capsys.readouterr().err
+
+    def lost(*_: object) -> object:
+        message = "no way"
+        raise Infeasible(message)
+
+    monkeypatch.setattr(arm_subject.ArmSubject, "repair", lost)
+    assert run("repair", *verify[1:]) == 1
     assert "out/verification.json is of an earlier run" in capsys.readouterr().err
 
 

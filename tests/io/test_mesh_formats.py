@@ -549,6 +549,16 @@ def test_damage_of_ply_and_dae_is_named(
     assert expected in str(caught.value)
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
+def test_entities_of_dae_are_refused_in_every_encoding(
+    tmp_path: Path, encoding: str
+) -> None:
+    text = '<!DOCTYPE a [<!ENTITY b "c">]><COLLADA>&b;</COLLADA>'
+    (tmp_path / "a.dae").write_bytes(text.encode(encoding))
+    with pytest.raises(InvalidFile, match="has a DOCTYPE"):
+        read_mesh(tmp_path / "a.dae")
+
+
 @pytest.mark.parametrize("kind", ["obj", "ply", "glb", "dae"])
 @pytest.mark.parametrize("odd", ["nan", "inf", "1e300"])
 def test_vertices_that_no_triangle_names_may_be_anything(

@@ -564,7 +564,11 @@ def test_the_command_ends_with_the_verdict(
     assert len(rows) == 1 + 3 + 1  # three links to the ball, base to hand
     assert run(*asked, "--out", out, "--required-clearance-mm", 151) == 1
     assert run(*asked, "--out", out, "--lock", "elbow=1") == 2
-    assert "has no joint 'elbow' to lock" in capsys.readouterr().err
+    twice = "--lock", "slide=1", "--lock", "slide=2"
+    assert run(*asked, "--out", out, *twice) == 2
+    said = capsys.readouterr().err
+    assert "has no joint 'elbow' to lock" in said
+    assert "--lock is given twice for 'slide'" in said
     assert run("verify", "paper/obs1", *asked[1:], "--out", out) == 2
     assert "PROBLEM has no meaning with --urdf" in capsys.readouterr().err
     assert run("verify", "--trajectory", rows, "--out", out) == 2

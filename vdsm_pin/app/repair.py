@@ -9,7 +9,9 @@ from vdsm_pin.app.motions import MotionOptions
 from vdsm_pin.app.workflow import (
     JUDGED,
     TRAJECTORY,
+    VERIFICATION,
     VerifyOrder,
+    naming_earlier,
     read_given,
     verify_into,
 )
@@ -48,7 +50,8 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Repair
     check_output_folder(order.folder)
     check_kept([order.folder / n for n in (TRAJECTORY, REPAIR, *JUDGED)], inputs)
     motion, digest, subject = read_given(order)
-    found = subject.repair(motion, pinned)
+    with naming_earlier(order.folder / VERIFICATION):
+        found = subject.repair(motion, pinned)
     check_unchanged(order.trajectory, digest)
     rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
     content = {
@@ -61,7 +64,8 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Repair
             for given, moved in rows
         ],
     }
-    with staged(order.folder) as staging:
+    earlier = naming_earlier(order.folder / VERIFICATION)
+    with earlier, staged(order.folder) as staging:
         subject.write(staging / TRAJECTORY, subject.motion_of(found.verification))
         (staging / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
         options = MotionOptions(deadline=order.options.deadline)

@@ -3,6 +3,8 @@
 Nothing is judged here: problems are read, planned, verified and written down.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -16,7 +18,6 @@ from vdsm_pin.errors import (
     Infeasible,
     InvalidFile,
     OutOfTime,
-    VdsmError,
     VerificationFailed,
 )
 from vdsm_pin.io.source import (
@@ -146,14 +147,14 @@ def plan_to_folder(
     model = load_arm(problem.manipulator)
     date = now() if report else None
     record = RunRecord.of(command, problem.source, model.urdf_sha256, date=date)
-    try:
-        refinement = plan_and_verify(problem, strategy, deadline=deadline)
-    except (Infeasible, OutOfTime) as error:
-        with staged(folder) as staging:
-            write_no_plan(staging / NO_PLAN, problem, error, strategy, record)
-        error.page = folder / NO_PLAN
-        _name_earlier(error, folder / PLAN)
-        raise
+    with naming_earlier(folder / PLAN):
+        try:
+            refinement = plan_and_verify(problem, strategy, deadline=deadline)
+        except (Infeasible, OutOfTime) as error:
+            with staged(folder) as staging:
+                write_no_plan(staging / NO_PLAN, problem, error, strategy, record)
+            error.page = folder / NO_PLAN
+            raise
     plan = refinement.plan
     with staged(folder) as staging:
         write_trajectory(staging / TRAJECTORY, plan.trajectory)
@@ -195,21 +196,22 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     """
     _check_outputs(order)
     given = read_given(order)
-    try:
-        with staged(order.folder) as staging:
-            verified = verify_into(order, given, staging)
-    except (OutOfTime, VerificationFailed) as error:
-        _name_earlier(error, order.folder / VERIFICATION)
-        raise
+    with naming_earlier(order.folder / VERIFICATION), staged(order.folder) as staging:
+        verified = verify_into(order, given, staging)
     if order.pdf is not None:
         print_page(order.folder / REPORT, order.pdf)
     return verified
 
 
-def _name_earlier(error: VdsmError, result: Path) -> None:
-    """Have an error say that a result is of an earlier run, where there is one."""
-    if result.exists():
-        error.more += (f"{result} is of an earlier run",)
+@contextmanager
+def naming_earlier(result: Path) -> Iterator[None]:
+    """Have an error of the block say that a result is of an earlier run."""
+    try:
+        yield
+    except (Infeasible, OutOfTime, VerificationFailed) as error:
+        if result.exists():
+            error.more += (f"{result} is of an earlier run",)
+        raise
 
 
 class Given(NamedTuple):

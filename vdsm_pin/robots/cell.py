@@ -269,6 +269,9 @@ def locks(words: tuple[str, ...]) -> dict[str, float]:
     found = {}
     for word in words:
         name, _, value = word.partition("=")
+        if name in found:
+            message = f"--lock is given twice for {name!r}"
+            raise InvalidInput(message)
         try:
             found[name] = float(value)
         except ValueError:

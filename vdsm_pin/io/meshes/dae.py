@@ -38,7 +38,8 @@ def read_dae(stream: MeshStream) -> RawMesh:
         problem = f"is larger than {MAX_BYTES >> 20} MiB, the most that is read as XML"
         raise stream.invalid(problem)
     content = stream.content.read()
-    if b"<!DOCTYPE" in content:  # whose entities may grow without end
+    plain = content.replace(b"\0", b"")  # of two bytes or four a letter, perhaps
+    if b"<!DOCTYPE" in plain:  # whose entities may grow without end
         raise stream.invalid(problem="has a DOCTYPE, expected plain XML")
     root = read_xml(content, stream.path)
     if _tag(root) != "COLLADA":
