@@ -20,7 +20,7 @@ from oracles.tree_queries import (
 from vdsm_pin.geometry.arrays import FloatArray, same_arrays
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof import rows, workspace
-from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.blocks import run_sweep
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.broad_phase import FEW
 from vdsm_pin.proof.paths import Path
@@ -182,8 +182,7 @@ def test_yes_or_no_is_what_the_bounds_say(seed: int, error: float) -> None:
     def answered(limits: dict[int, float]) -> bool:
         asked = [Pair(every[k].one, every[k].other, r) for k, r in limits.items()]
         made, _ = start_proof(tree, bodies, path, PairTable.of(asked), box)
-        parts = made.task, made.motion, made.work, made.results, made.broad
-        return bool(sweep(*parts, (0, made.n_intervals), True))
+        return bool(run_sweep(made.sweeping, (0, made.n_intervals), True))
 
     kept = {k: float(proof.lower[k]) - 1e-4 for k in apart}
     assert answered(kept)

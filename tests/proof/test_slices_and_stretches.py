@@ -240,10 +240,9 @@ def test_a_sweep_that_is_out_of_time_judges_nothing() -> None:
     for until in (0.0, np.inf):
         budget = Budget(until=until)
         proving, _ = start_proof(slide, bodies, path, pairs, budget=budget)
-        asked = proving.task, proving.motion, proving.work, proving.results
         plain(fill_rows)(proving.task, proving.motion, proving.work.rows, 0, 3)
         stretch = Stretch(0, 0, 3, False, False, False)
-        assert plain(sweep_pair)(*asked, 0, stretch) == (until > 0.0)
+        assert plain(sweep_pair)(proving.sweeping, 0, stretch) == (until > 0.0)
         assert proving.results.counts.sum() == (3 if until > 0.0 else 0)
 
 

@@ -6,15 +6,15 @@ from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.proof.broad_phase import settle_far
 from vdsm_pin.proof.cached_planes import served
-from vdsm_pin.proof.far_pairs import BroadPhase, merge_far
+from vdsm_pin.proof.far_pairs import merge_far
 from vdsm_pin.proof.layouts import OWN_POINT, ROW, UP, WIDTH
 from vdsm_pin.proof.least_bracket import narrow
-from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.plane_bounds import bound_above, bound_below
 from vdsm_pin.proof.results import Results, count_the_rest, note_block, note_upper
 from vdsm_pin.proof.row_places import fill_rows, seen
 from vdsm_pin.proof.rows import BLOCK, TURNED
+from vdsm_pin.proof.sweep import Sweep
 from vdsm_pin.proof.terms import ACROSS, CERTIFIED, WITHIN, Task
 from vdsm_pin.proof.witnesses import place_best
 from vdsm_pin.proof.workspace import Workspace
@@ -50,15 +50,10 @@ def _serves(
 
 @compiled(inline=False)
 def _sweep_block(
-    task: Task,
-    motion: Motion,
-    work: Workspace,
-    results: Results,
-    near: IntArray,
-    stretch: Stretch,
-    settled: BoolArray,
+    sweep: Sweep, near: IntArray, stretch: Stretch, settled: BoolArray
 ) -> bool:
-    """All near pairs over a block whose rows are filled, as `sweep`."""
+    """All near pairs over a block whose rows are filled, as `run_sweep`."""
+    task, work, results = sweep.task, sweep.work, sweep.results
     runs, pairs, count = work.runs, task.pairs, stretch.size
     quick = task.rules.steady and results.dense.verdict.shape[0] == 0
     for pair in near:
@@ -67,7 +62,7 @@ def _sweep_block(
         asked = Stretch(stretch.start, stretch.offset, count, closely, yes_or_no, False)
         segment = task.bodies.inverse[pairs.body[pair]] >= 0.0
         if not (quick and segment and _serves(task, work, results, pair, asked)):
-            if not sweep_pair(task, motion, work, results, pair, asked):
+            if not sweep_pair(sweep, pair, asked):
                 return False
         if stretch.yes_or_no:  # all that is asked is whether everything is proved
             continue
@@ -77,16 +72,9 @@ def _sweep_block(
 
 
 @compiled(inline=False)
-def _sweep(
-    task: Task,
-    motion: Motion,
-    work: Workspace,
-    results: Results,
-    broad: BroadPhase,
-    span: tuple[int, int],
-    yes_or_no: bool,
-) -> bool:
-    """`sweep` of what is borrowed."""
+def _run_sweep(sweep: Sweep, span: tuple[int, int], yes_or_no: bool) -> bool:
+    """`run_sweep` of what is borrowed."""
+    task, work, results, broad = sweep.task, sweep.work, sweep.results, sweep.broad
     block = work.rows.block
     if task.rules.steady and block[TURNED]:
         # Whoever asks about several error boxes leaves here what the last one added.
@@ -104,24 +92,16 @@ def _sweep(
             before[group] = limit[group]
         count = min(BLOCK, last - start)
         stretch = Stretch(start, start - first, count, False, yes_or_no, False)
-        fill_rows(task, motion, work.rows, start, count)
+        fill_rows(task, sweep.motion, work.rows, start, count)
         n_near = settle_far(task, work, results, broad, stretch)
         near = broad.near[:n_near]
-        if not _sweep_block(task, motion, work, results, near, stretch, settled):
+        if not _sweep_block(sweep, near, stretch, settled):
             return False
     return True
 
 
 @compiled
-def sweep(
-    task: Task,
-    motion: Motion,
-    work: Workspace,
-    results: Results,
-    broad: BroadPhase,
-    span: tuple[int, int],
-    yes_or_no: bool,
-) -> bool:
+def run_sweep(sweep: Sweep, span: tuple[int, int], yes_or_no: bool) -> bool:
     """Judge some intervals.
 
     Returns:
@@ -129,32 +109,15 @@ def sweep(
         the time is over: what is left is then not counted.
 
     Args:
-        task: The scene, pairs and rules.
-        motion: Rows of joint values.
-        work: Working space; what the pairs remember is carried on.
-        results: Where to write.
-        broad: For the pairs that are far.
+        sweep: What they are judged with.
         span: First interval, row 0 of the dense results, and one past the last.
         yes_or_no: As for `sweep_pair`.
     """
-    task = borrowed(task)
-    motion = borrowed(motion)
-    work = borrowed(work)
-    results = borrowed(results)
-    broad = borrowed(broad)
-    return _sweep(task, motion, work, results, broad, span, yes_or_no)
+    return _run_sweep(borrowed(sweep), span, yes_or_no)
 
 
 @compiled
-def judge(
-    task: Task,
-    motion: Motion,
-    work: Workspace,
-    results: Results,
-    broad: BroadPhase,
-    span: tuple[int, int],
-    narrowing: bool,
-) -> bool:
+def judge(sweep: Sweep, span: tuple[int, int], narrowing: bool) -> bool:
     """Judge some intervals, whatever the time does not allow as undecided.
 
     The far pairs are brought to the results, the witnesses placed on the surfaces.
@@ -163,24 +126,17 @@ def judge(
         Whether there was time for all.
 
     Args:
-        task: As for `sweep`, like those that follow.
-        motion: Rows of joint values.
-        work: Working space.
-        results: Where to write.
-        broad: For the pairs that are far.
+        sweep: What they are judged with.
         span: The intervals.
         narrowing: Whether to narrow the least brackets, of all intervals, in time.
     """
-    task = borrowed(task)
-    motion = borrowed(motion)
-    work = borrowed(work)
-    results = borrowed(results)
-    broad = borrowed(broad)
-    in_time = _sweep(task, motion, work, results, broad, span, False)
-    merge_far(task, motion, work.ends, results, broad)
+    sweep = borrowed(sweep)
+    task, motion, ends = sweep.task, sweep.motion, sweep.work.ends
+    in_time, results = _run_sweep(sweep, span, False), sweep.results
+    merge_far(task, motion, ends, results, sweep.broad)
     count_the_rest(results, span[1] - span[0])
     if in_time and narrowing:
-        narrow(task, motion, work, results, ACROSS)
-        narrow(task, motion, work, results, WITHIN)
-    place_best(task, motion, work.ends, results.best)
+        narrow(sweep, ACROSS)
+        narrow(sweep, WITHIN)
+    place_best(task, motion, ends, results.best)
     return in_time

@@ -18,14 +18,13 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.rows import BEGIN, COUNT
 from vdsm_pin.proof.search import Slicing, new_witnesses, tighten
+from vdsm_pin.proof.sweep import Sweep
 from vdsm_pin.proof.terms import ACROSS, Task
-from vdsm_pin.proof.workspace import Workspace
 
 
 @compiled(inline=False)
@@ -53,20 +52,14 @@ def _in_order(task: Task, results: Results, group: int, heap: FloatArray) -> Int
 
 
 @compiled(inline=False)
-def _look_again(
-    task: Task,
-    motion: Motion,
-    work: Workspace,
-    results: Results,
-    group: int,
-    order: IntArray,
-) -> int:
+def _look_again(sweep: Sweep, group: int, order: IntArray) -> int:
     """Sweep the candidates closely; what is still below goes to `work.intervals`.
 
     Returns:
         Their number. What finds no room, or is not looked at since links and obstacles
         meet, is left in `results.overflow`.
     """
+    task, work, results = sweep.task, sweep.work, sweep.results
     held, lower, count = results.candidates, work.runs.lower, 0
     heap = work.intervals
     row, beyond = np.zeros(SLICE), results.overflow
@@ -83,9 +76,9 @@ def _look_again(
         if (
             start != block[BEGIN] or size != block[COUNT]
         ):  # what was judged last is there
-            fill_rows(task, motion, work.rows, start, size)
+            fill_rows(task, sweep.motion, work.rows, start, size)
         stretch = Stretch(start, 0, size, True, False, True)
-        sweep_pair(task, motion, work, results, pair, stretch)
+        sweep_pair(sweep, pair, stretch)
         for local in range(size):
             if not lower[local] < results.limit[group] - task.rules.gap:
                 continue
@@ -129,25 +122,21 @@ def _raise_bounds(
 
 
 @compiled(inline=False)
-def narrow(
-    task: Task, motion: Motion, work: Workspace, results: Results, group: int
-) -> None:
+def narrow(sweep: Sweep, group: int) -> None:
     """Narrow the least bracket of a group of pairs.
 
     Args:
-        task: The scene, pairs and rules.
-        motion: Rows of joint values.
-        work: Working space.
-        results: Holds the candidates; bounds, profile and limit are improved.
+        sweep: Its results hold the candidates; bounds, profile and limit are improved.
         group: The group.
     """
+    task, work, results = sweep.task, sweep.work, sweep.results
     heap = work.intervals
     order = _in_order(task, results, group, heap)
     if order.size == 0:
         return
-    count = _look_again(task, motion, work, results, group, order)
+    count = _look_again(sweep, group, order)
     found = new_witnesses(results.best.shape[0], results.limit[group])
-    slicing = Slicing(task, motion, work.ends, work.space)
+    slicing = Slicing(task, sweep.motion, work.ends, work.space)
     count = tighten(slicing, heap, count, found)
     for pair in range(found.upper.size):
         if found.upper[pair] < results.best[pair, UP]:

@@ -40,13 +40,13 @@ from vdsm_pin.proof.layouts import (
     WHEN,
     WIDTH,
 )
-from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.plane_bounds import place_disc, place_own
 from vdsm_pin.proof.results import Results, note_upper
 from vdsm_pin.proof.row_places import seen
 from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.search import Slicing, new_witness, place_pair, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
+from vdsm_pin.proof.sweep import Sweep
 from vdsm_pin.proof.swept_bodies import to_body
 from vdsm_pin.proof.terms import CERTIFIED, Mover, Task, finer, mover_of
 from vdsm_pin.proof.witnesses import witness_at
@@ -167,18 +167,11 @@ def _look_at_row(
 
 
 @compiled(inline=False)
-def _subdivide(
-    task: Task,
-    motion: Motion,
-    work: Workspace,
-    results: Results,
-    pair: int,
-    stretch: Stretch,
-    local: int,
-) -> int:
+def _subdivide(sweep: Sweep, pair: int, stretch: Stretch, local: int) -> int:
     """Decide one interval of a block by subdivision; its verdict."""
+    task, work, results = sweep.task, sweep.work, sweep.results
     row, witness = np.zeros(SLICE), new_witness()
-    slicing = Slicing(task, motion, work.ends, work.space)
+    slicing = Slicing(task, sweep.motion, work.ends, work.space)
     k = stretch.start + local
     row[INTERVAL], row[PAIR], row[END], row[KEY] = k, pair, 1.0, -np.inf
     witness.value[KNOWN] = results.best[pair, UP]
@@ -265,14 +258,7 @@ def _face(task: Task, mover: Mover, rows: Rows, plane: FloatArray, pair: int) ->
 
 
 @compiled(inline=False)
-def sweep_pair(
-    task: Task,
-    motion: Motion,
-    work: Workspace,
-    results: Results,
-    pair: int,
-    stretch: Stretch,
-) -> bool:
+def sweep_pair(sweep: Sweep, pair: int, stretch: Stretch) -> bool:
     """All intervals of a block for one pair, from first to last.
 
     An interval is tried with the plane that served last, with all after it; where that
@@ -285,13 +271,11 @@ def sweep_pair(
         the time is over: the rest is then neither judged nor counted.
 
     Args:
-        task: The scene, pairs and rules.
-        motion: Rows of joint values.
-        work: Working space, its rows filled; its runs are written.
-        results: Where to write.
+        sweep: What they are judged with, its rows filled; its runs are written.
         pair: The pair.
         stretch: The intervals.
     """
+    task, work, results = sweep.task, sweep.work, sweep.results
     rules, rows, runs, plane = task.rules, work.rows, work.runs, work.planes[pair]
     required, group = task.pairs.required[pair], task.pairs.group[pair]
     count, yes_or_no = stretch.size, stretch.yes_or_no
@@ -335,7 +319,7 @@ def sweep_pair(
         elif is_new:
             if yes_or_no and runs.upper[local] < required:
                 return False
-            verdict = _subdivide(task, motion, work, results, pair, stretch, local)
+            verdict = _subdivide(sweep, pair, stretch, local)
             if yes_or_no and verdict != CERTIFIED:
                 return False
             done = local + 1

@@ -5,13 +5,14 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.proof.blocks import judge, sweep
+from vdsm_pin.proof.blocks import judge, run_sweep
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.far_pairs import BroadPhase, new_broad_phase
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.results import Candidates, Dense, Results
 from vdsm_pin.proof.rows import BLOCK
+from vdsm_pin.proof.sweep import Sweep
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import Workspace, new_workspace
 
@@ -95,11 +96,14 @@ class Proving:
         total = self.results.counts.shape[0] * self.n_intervals
         return judged / float(max(1, total))
 
+    @property
+    def sweeping(self) -> Sweep:
+        """What compiled code judges intervals with."""
+        return Sweep(self.task, self.motion, self.work, self.results, self.broad)
+
     def sweep(self, first: int, last: int) -> bool:
         """Judge some intervals; whether there was time for all."""
-        span = first, last
-        args = self.task, self.motion, self.work, self.results, self.broad
-        return bool(sweep(*args, span, False))
+        return bool(run_sweep(self.sweeping, (first, last), False))
 
     def run(self) -> bool:
         """Judge all intervals, narrow the least brackets, place the witnesses.
@@ -114,8 +118,7 @@ class Proving:
         return self._judge((first, last), False)
 
     def _judge(self, span: tuple[int, int], narrowing: bool) -> bool:
-        args = self.task, self.motion, self.work, self.results, self.broad
-        return bool(judge(*args, span, narrowing))
+        return bool(judge(self.sweeping, span, narrowing))
 
     def new_results(self) -> Results:
         """Where to write what is asked again."""

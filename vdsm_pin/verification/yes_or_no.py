@@ -7,7 +7,7 @@ import numpy as np
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.blocks import run_sweep
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.packing import with_errors
 from vdsm_pin.proof.workspace import forget
@@ -63,8 +63,8 @@ class YesOrNoProof:
         forget(known.work.planes)
         # No least clearance is asked for: whatever is proved may be culled.
         known.results.limit[:] = -np.inf
-        args = task, known.motion, known.work, known.results, known.broad
-        proved = bool(sweep(*args, (self._first[first], self._first[last]), True))
+        asked = known.sweeping._replace(task=task)
+        proved = bool(run_sweep(asked, (self._first[first], self._first[last]), True))
         self._deadline.check()
         return proved
 
