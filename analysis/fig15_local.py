@@ -1,6 +1,5 @@
 """Fig. 15: the link angles enlarged where an obstacle changes them."""
 
-import numpy as np
 from matplotlib.figure import Figure
 from paper_figures import style
 from paper_figures.curves import (
@@ -13,8 +12,7 @@ from paper_figures.curves import (
 )
 from paper_figures.runs import Run, Runs
 from paper_figures.style import save_all
-
-from vdsm_pin.tolerances import TOLERANCES
+from paper_table import stretches
 
 NAME = "fig15"
 MARGIN = 12  # waypoints shown before and after
@@ -60,11 +58,9 @@ def window(run: Run, stretch: int) -> slice:
         run: The plan.
         stretch: Which of them, 0 the first and -1 the last.
     """
-    bent = (run.psi[:, 1:] > TOLERANCES.changed_angle).any(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], bent.astype(int), [0]])))
-    stretches = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-    begin, end = stretches[stretch] if stretches else (0, run.trajectory.n_samples)
-    return slice(max(begin - MARGIN, 0), min(end + MARGIN, run.trajectory.n_samples))
+    found, n = stretches(run.psi), run.trajectory.n_samples
+    rows = found[stretch] if found else slice(0, n)
+    return slice(max(rows.start - MARGIN, 0), min(rows.stop + MARGIN, n))
 
 
 if __name__ == "__main__":

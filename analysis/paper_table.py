@@ -74,6 +74,9 @@ PAPER: Final = {
     ("obs2-small", "stretch"): "B1 to B4 and B6 to B10 (6.2.2)",
     ("obs3", "stretch"): "A2 to A7 (6.2.2)",
     ("obs1", "order"): "psi8, psi7, .. psi4 near A5 (6.2.2)",
+    ("obs1", "ended"): "psi8, psi7, at last psi4..psi6 (6.2.2)",
+    ("obs2", "ended"): "psi8..psi2 separately (6.2.2)",
+    ("obs2-small", "ended"): "psi8..psi2 separately (6.2.2)",
     ("obs2", "order"): "psi2..psi8 slightly all at once, then separately (6.2.2)",
     ("obs2-small", "order"): "psi2..psi8 slightly all at once, then separately (6.2.2)",
     ("obs3", "order"): "psi4..psi6, psi4 and psi6 never together (6.2.2)",
@@ -82,6 +85,9 @@ PAPER: Final = {
     ("obs3", "error"): "mostly within 0.3, up to about 4 (7)",
 }
 """What the paper says; a dash stands for nothing."""
+
+ENLARGED: Final = {"obs1": -1}
+"""Which of the stretches with more than psi1 Fig. 15 shows: the first if not here."""
 
 
 def changed(psi: FloatArray) -> str:
@@ -110,13 +116,36 @@ def stretch(result: Refinement) -> str:
     return " to ".join(f"({y:.0f}, {z:.0f})" for y, z in ends)
 
 
+def stretches(psi: FloatArray) -> list[slice]:
+    """Rows between which psi2..psiN are not all zero; psi of shape (n, N); [rad]."""
+    bent = (psi[:, 1:] > TOLERANCES.changed_angle).any(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], bent.astype(int), [0]])))
+    return [slice(a, b) for a, b in edges.reshape(-1, 2).tolist()]
+
+
 def order(psi: FloatArray) -> str:
-    """The link angles in the order in which they first change; psi of shape (n, N)."""
-    bent = psi > TOLERANCES.changed_angle
-    first = np.argmax(bent[:, 1:], axis=0)
-    together = [np.flatnonzero(first == row) + 2 for row in np.unique(first[first > 0])]
+    """The link angles in the order in which they first change, but for psi1.
+
+    Args:
+        psi: Rows in the order to look at, shape (n, N); [rad].
+    """
+    bent = psi[:, 1:] > TOLERANCES.changed_angle
+    first = np.where(bent.any(axis=0), np.argmax(bent, axis=0), -1)
+    together = [
+        np.flatnonzero(first == row) + 2 for row in np.unique(first[first >= 0])
+    ]
     names = [" with ".join(f"psi{joint}" for joint in joints) for joints in together]
-    return ", ".join(names) or "psi1 alone"
+    return ", ".join(names)
+
+
+def orders(scene: str, psi: FloatArray) -> tuple[str, str]:
+    """In which order link angles begin and end where Fig. 15 enlarges the scene."""
+    found = stretches(psi)
+    if not found:
+        return "psi1 alone", "psi1 alone"
+    rows = psi[found[ENLARGED.get(scene, 0)]]
+    ended = order(rows[::-1]).split(", ")
+    return order(rows), ", ".join(reversed(ended))
 
 
 def touching_error(result: Refinement) -> float:
@@ -131,10 +160,12 @@ def rows_of(scene: str, result: Refinement) -> list[Row]:
     trajectory, verification = result.plan.trajectory, result.verification
     psi = link_angles(trajectory.alpha, trajectory.theta)
     steps = np.abs(np.diff(trajectory.joints[:, 1:], axis=0))
+    begun, ended = orders(scene, psi)
     ours = {
         "psi": ("largest psi [deg]", f"{np.rad2deg(psi.max()):.2f}"),
         "changed": ("link angles that change", changed(psi)),
-        "order": ("link angles in the order in which they begin", order(psi)),
+        "order": ("link angles in the order in which they begin", begun),
+        "ended": ("link angles in the order in which they return to zero", ended),
         "stretch": (
             "more than psi1 is changed, on the path (y, z) [mm]",
             stretch(result),

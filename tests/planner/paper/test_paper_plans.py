@@ -1,5 +1,6 @@
 """Whole plans of the paper's rule: published numbers, random scenes, refusals."""
 
+import itertools
 import re
 from contextlib import suppress
 from dataclasses import replace
@@ -202,6 +203,37 @@ def test_obs1_shows_the_printed_pattern_of_zero_angles() -> None:
     np.testing.assert_array_equal(psi[a4] > 0.5, [1, 0, 0, 0, 0, 0, 1, 1])
     np.testing.assert_array_equal(psi[a5] > 0.05, [1, 0, 0, 1, 1, 1, 1, 1])
     np.testing.assert_array_equal(psi[a6] > 0.05, [1, 0, 0, 1, 1, 1, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("name", "straight", "bent", "begin", "end"),
+    [
+        ("obs1", 350, 458, "8 7 6 5 4", "8 7 456"),
+        ("obs2", 0, 214, "8 7 6 5 4 3 2", "8 7 6 5 4 23"),
+    ],
+)
+def test_link_angles_begin_and_end_in_the_printed_order(
+    name: str, straight: int, bent: int, begin: str, end: str
+) -> None:
+    """Section 6.2.2 (2), (3): about A5 in obs1 and from B1 in obs2.
+
+    Args:
+        name: The scene.
+        straight: A waypoint before, where only psi1 is not zero.
+        bent: A waypoint where they are not zero.
+        begin: Joints in the order in which they begin, one by one.
+        end: And in which they return to zero; the last ones together or not.
+    """
+    rows = psi_deg(plan_of(name))[:, 1:] > 0.05
+    assert not rows[straight].any()
+    last = bent + int(np.argmin(rows[bent:].any(axis=1)))
+    part, joints = rows[straight:last], [int(one) - 2 for one in begin.split()]
+    first = [int(np.argmax(part[:, j])) for j in joints]
+    assert first == sorted(set(first))
+    gone = [len(part) - int(np.argmax(part[::-1, j])) for j in range(7)]
+    groups = [[gone[int(one) - 2] for one in group] for group in end.split()]
+    for before, after in itertools.pairwise(groups):
+        assert max(before) < min(after)
 
 
 def test_obs1_goes_back_round_the_base_facing_side() -> None:
