@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 import typer
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
@@ -132,6 +133,27 @@ def test_wrong_usage_is_status_2(vdsm: Shell, words: list[str]) -> None:
     ran = vdsm(*words)
     assert ran.status == 2
     assert "Traceback" not in ran.err
+
+
+def test_an_arm_is_converted_both_ways(
+    vdsm: Shell, planned: Path, tmp_path: Path
+) -> None:
+    """Angles, centres, cables and back (the paper's section 5)."""
+    near, rows = planned / "near.yaml", planned / "trajectory.csv"
+    made = tmp_path / "all"
+    assert vdsm("convert", near, "--trajectory", rows, "--out", made).status == 0
+    wanted = np.loadtxt(rows, delimiter=",", skiprows=1)
+    for kind in ("centres", "cables"):
+        back, file = tmp_path / kind, made / f"{kind}.csv"
+        assert vdsm("convert", near, f"--{kind}", file, "--out", back).status == 0
+        for name in ("trajectory", "centres", "cables"):
+            found = np.loadtxt(back / f"{name}.csv", delimiter=",", skiprows=1)
+            first = (
+                wanted
+                if name == "trajectory"
+                else np.loadtxt(made / f"{name}.csv", delimiter=",", skiprows=1)
+            )
+            np.testing.assert_allclose(found, first, rtol=0, atol=1e-9)
 
 
 def test_a_certified_motion_has_every_file(planned: Path) -> None:

@@ -256,6 +256,37 @@ def test_obs3_changes_only_psi1_and_the_ends_of_one_link() -> None:
     assert "link 4 is laid past 'column'" in plan_of("obs3").notes[0]
 
 
+def test_obs3_is_drawn_whole_without_leaving_the_path() -> None:
+    rows = plan_of("obs3").trajectory
+    edges = np.flatnonzero(np.diff(rows.on_path.astype(int)))
+    assert len(edges) == 2  # onto the path and off it at its end
+    assert rows.path_m[rows.on_path].max() == pytest.approx(6.0)
+
+
+def test_obs3_changes_six_rotations_within_35_degrees() -> None:
+    """Section 7: what the experiment turned, and how far."""
+    turns = np.rad2deg(np.abs(plan_of("obs3").trajectory.joints[:, 1:]).max(axis=0))
+    assert (turns > 0.05).sum() == 6
+    assert turns.max() < 35.0
+
+
+@pytest.mark.parametrize(
+    ("approach", "begin"),
+    [(Approach.SHORTEST, (0.0, -0.2)), (Approach.EQUIDISTANT, (1.0, 6.0 / 7.0))],
+)
+def test_obs1_begins_at_its_equidistant_point_if_asked(
+    approach: Approach, begin: tuple[float, float]
+) -> None:
+    """Fig. 6a: A2, or A4', where the line from A1 through (700, 600) meets the path."""
+    problem = paper("obs1")
+    path = replace(problem.path, approach=approach)
+    plan = planned(replace(problem, tip_path=path))
+    check_plan(plan)
+    drawn = plan.tip_path.points[plan.trajectory.on_path]
+    np.testing.assert_allclose(drawn[0, 1:], begin, atol=1e-9)
+    assert drawn_length(plan) > 0.98 * 6.0
+
+
 def test_obs2_begins_and_ends_at_its_equidistant_point() -> None:
     plan = plan_of("obs2-small")
     drawn = plan.tip_path.points[plan.trajectory.on_path]
