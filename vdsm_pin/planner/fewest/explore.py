@@ -7,11 +7,11 @@ import itertools
 import logging
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.errors import NoWayOut
+from vdsm_pin.errors import NoWayOut, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.grown_nodes import fill
@@ -19,6 +19,7 @@ from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.joint_error import link_margins
 from vdsm_pin.planner.fewest.judge import Judge, link_limit
 from vdsm_pin.planner.fewest.levels import (
+    BESIDE,
     FULL,
     SEED,
     Effort,
@@ -31,6 +32,7 @@ from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, rolled, tip_route
 from vdsm_pin.planner.fewest.search import Found, Searched, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
+from vdsm_pin.planner.fewest.sparsify import mean_knees, sparser
 from vdsm_pin.planner.fewest.start_node import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
@@ -55,6 +57,12 @@ FEW_CELLS: Final = 16_000
 
 ROOMY: Final = 0.96
 """Part of the tips at which some arm stands where nothing confines it; [-]."""
+
+ONE_KNEE_DRAWS: Final = 0.75
+"""Part of the path's tips at which some arm of one knee stands, from which on a roadmap
+may draw the path with fewer knees than an insertion; [-]."""
+FEW_KNEES: Final = 2.0
+"""Mean number of knees of an insertion up to which no roadmap is asked for fewer."""
 
 LOG: Final = logging.getLogger(__name__)
 
@@ -81,6 +89,24 @@ class Explored:
     def missing(self) -> float:
         """Length not drawn and not proved impossible; [m]."""
         return np.inf if self.found is None else self.found.missing
+
+    @property
+    def knees(self) -> float:
+        """Mean number of changed angles where the tip draws."""
+        assert self.found is not None
+        return mean_knees(self.judge, self.found.corners)
+
+    def sparser(self) -> "Explored":
+        """The same with knees taken away from its motion."""
+        assert self.found is not None
+        corners = sparser(self.judge, self.found.corners)
+        return replace(self, found=replace(self.found, corners=corners))
+
+    def beats(self, other: "Explored") -> bool:
+        """Whether it draws more, or all that can be drawn with fewer knees."""
+        if self.missing > 0.0 or other.missing > 0.0:
+            return self.missing < other.missing
+        return self.knees < other.knees
 
     @property
     def drawn(self) -> BoolArray:
@@ -140,9 +166,9 @@ def explore(
     stuck: Stuck | None = None
     spaces = _Spaces(problem, clearance, margin)
     proofs = 2 if effort.proves else 0
-    levels, confined = effort.levels, True
+    levels, room = effort.levels, Room(0.0, 0.0)
     while levels:
-        if best.found is None and confined:
+        if best.found is None and room.confined:
             levels = confined_first(levels)
         level, levels = levels[0], levels[1:]
         ease = max(level.ease, least_ease)
@@ -159,14 +185,25 @@ def explore(
                 now = _inserted(now, spaces.of(level), level, soon)
                 stuck = now.stuck
             elif isinstance(level, Search):
-                found, confined = _look(judge, level, rows, proof, weights)
+                found, room = _look(judge, level, rows, proof, weights)
                 now = Explored(judge, found, rows, proof, stuck)
         except NoWayOut as error:
             no_way_out = error
+        except OutOfTime:
+            if best.missing > 0.0:
+                raise
+            return
         LOG.debug("%s: %.4f m missing", level, now.missing)
-        if now.missing < best.missing:
+        if now.beats(best):
             best = now
         best = replace(best, stuck=stuck)
+        if not best.missing > 0.0 and BESIDE in levels and room.one_knee_draws:
+            best = best.sparser()
+            if best.knees > FEW_KNEES:
+                # It draws the path whole; a roadmap may with fewer knees.
+                levels = (BESIDE,)
+                yield best
+                continue
         yield best
         if not best.missing > 0.0 or (best.found is not None and soon.passed):
             return
@@ -184,6 +221,26 @@ def explore(
                 return
     if best.found is None and stuck is None and no_way_out is not None:
         raise no_way_out
+
+
+class Room(NamedTuple):
+    """Parts of a roadmap's tips at which some arm stands."""
+
+    everywhere: float
+    """Of all tips; [-]."""
+
+    on_path: float
+    """Of those along the path; [-]."""
+
+    @property
+    def confined(self) -> bool:
+        """Whether there are many tips at which no arm stands."""
+        return self.everywhere < ROOMY
+
+    @property
+    def one_knee_draws(self) -> bool:
+        """Whether arms with one knee stand along most of the path."""
+        return self.on_path >= ONE_KNEE_DRAWS
 
 
 class _Spaces:
@@ -307,11 +364,11 @@ def _hemmed_in(
 
 def _look(
     judge: Judge, level: Search, rows: PathRows, proof: TipProof, weights: CostWeights
-) -> tuple[Searched | None, bool]:
+) -> tuple[Searched | None, Room]:
     """One level: a roadmap, a search, and growth where it falls short.
 
     Returns:
-        What it found, and whether there are many tips at which no arm of it stands.
+        What it found, and at how many tips some arm of it stands.
     """
     problem = judge.problem
     arm = problem.manipulator
@@ -322,6 +379,7 @@ def _look(
     roadmap = build_roadmap(judge, weights, route, shapes, level.around)
     roadmap, start_node = with_start(judge, roadmap, weights)
     rng, standing = np.random.default_rng(SEED), np.diff(roadmap.tip_nodes) > 0
+    room = Room(float(standing.mean()), float(standing[route.layers].mean()))
     found = search(judge, roadmap, start_node, level.rounds)
     for _ in range(level.grow):
         if found is None or not found.missing > 0.0:
@@ -336,7 +394,7 @@ def _look(
         if again is None or not again.missing < found.missing:
             break
         found = again
-    return found, bool(standing.mean() < ROOMY)
+    return found, room
 
 
 def _unreached(found: Searched) -> bool:

@@ -35,10 +35,33 @@ def sparser(judge: Judge, corners: Corners) -> Corners:
     """
     corners = projected(judge, corners)
     joints = range(1, judge.problem.manipulator.n_links)
+    both = _in_order(judge, corners, joints), _in_order(judge, corners, joints[::-1])
+    return min(both, key=lambda one: mean_knees(judge, one))
+
+
+def mean_knees(judge: Judge, corners: Corners) -> float:
+    """Mean number of changed angles where the tip draws, by the length drawn.
+
+    From a corner to the next every joint is bent that is bent at either. Where the tip
+    draws nothing, all intervals count alike.
+    """
+    bent = judge.bends(corners.tips, corners.offsets) > TOLERANCES.changed_angle
+    knees = (bent[:-1] | bent[1:]).sum(axis=1)
+    length = np.abs(np.diff(corners.stations)) * corners.drawn
+    if not length.any():
+        length = np.full(len(knees), 1.0)
+    return float(np.average(knees, weights=length))
+
+
+def _in_order(judge: Judge, corners: Corners, joints: range) -> Corners:
+    """The motion with joints made straight in an order, until none can be."""
+    fewest = mean_knees(judge, corners)
     for _ in range(ROUNDS):
         before = corners
         for joint, way in itertools.product(joints, WAYS):
-            corners = _without(judge, corners, joint, way)
+            trial = _without(judge, corners, joint, way)
+            if trial is not corners and (knees := mean_knees(judge, trial)) < fewest:
+                corners, fewest = trial, knees
         if corners is before:
             break
     return corners
