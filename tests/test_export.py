@@ -157,6 +157,19 @@ def test_what_cannot_be_exported_is_one_message(
     assert [path.name for path in tmp_path.iterdir()] == ["near.yaml"]
 
 
+def test_the_clock_of_a_gltf_rises_where_the_arm_rests() -> None:
+    """By the specification (2.0, 3.11); times have single precision."""
+    rows = trajectory(60)
+    still = np.sort(np.r_[np.arange(60), np.full(30, 20)])
+    joints = Trajectory.of_joints(rows.joints[still])
+    content, binary = opened(glb(ArmDrawing(made_up_problem(), joints)))
+    (motion,) = content["animations"]
+    for sampler in motion["samplers"]:
+        times = array(content, binary, sampler["input"])[:, 0]
+        assert (np.diff(times) > 0.0).all()
+        assert len(array(content, binary, sampler["output"])) == len(times) > 50
+
+
 @pytest.mark.parametrize("seconds", ["inf", "nan", "0", "1e6"])
 def test_a_motion_plays_for_some_time(seconds: str, tmp_path: Path) -> None:
     file = str(write_problem(tmp_path / "near.yaml", NEAR))

@@ -373,6 +373,7 @@ def test_folders_and_built_ins_expand_in_order(problems: Path, tmp_path: Path) -
     assert "paper/obs1" in expanded(())
     inside = expanded((str(problems), str(problems / "good.yaml")))
     assert [Path(p).stem for p in inside] == ["bad", "far", "good", "other"]
+    assert expanded((str(problems), f"{problems}/.//good.yaml")) == inside
     with pytest.raises(InvalidFile, match="holds no"):
         expanded((str(tmp_path),))
 

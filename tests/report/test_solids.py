@@ -1,9 +1,11 @@
 """Oracle: volumes in closed form; one wrongly turned triangle changes the sum."""
 
 import numpy as np
+import pinocchio
 import pytest
 from made_up import X, Y, every_shape
 
+from vdsm_pin.geometry.arrays import quaternions, rotation_from_quaternion
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Mesh, Sphere
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.report.solids import Surface, detail, surface
@@ -63,6 +65,23 @@ def test_a_half_space_is_drawn_on_its_plane() -> None:
     np.testing.assert_allclose((skin.vertices - CENTRE) @ TILTED, 0.0, atol=1e-12)
     a, b, c = skin.vertices[skin.triangles[0]]
     assert np.cross(b - a, c - a) @ TILTED > 0.0
+
+
+def test_quaternions_are_those_of_pinocchio() -> None:
+    """Among them half turns and turns that differ from these by rounding."""
+    rng = np.random.default_rng(0)
+    axes = np.vstack([np.eye(3), rng.normal(size=(97, 3))])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    angles = np.r_[np.pi, np.pi, np.pi, np.pi - 1e-9, 0.0, rng.uniform(0.0, 6.3, 95)]
+    turns = np.array(
+        [pinocchio.AngleAxis(*one).matrix() for one in zip(angles, axes, strict=True)]
+    )
+    found = quaternions(turns.reshape(20, 5, 3, 3)).reshape(100, 4)
+    for turn, quaternion in zip(turns, found, strict=True):
+        expected = pinocchio.Quaternion(turn).coeffs()
+        assert abs(expected @ quaternion) == pytest.approx(1.0, abs=1e-15)
+        back = rotation_from_quaternion(quaternion)
+        np.testing.assert_allclose(back, turn, rtol=0, atol=1e-15)
 
 
 def test_a_large_mesh_is_drawn_with_few_triangles() -> None:

@@ -21,7 +21,7 @@ def simulation(n: int = 50) -> Simulation:
     planned = rng.normal(size=(n, 17))
     return Simulation(
         times, planned, planned + 0.001, rng.uniform(0.5, 900.0, (n, 24)),
-        np.zeros(n), np.zeros(n), np.array([[0.0, 90.0], [5.0, 60.0]]),
+        np.zeros(n), np.array([[0.0, 90.0], [5.0, 60.0]]),
         np.array([[0.0, 500.0], [5.0, 300.0]]), np.full(17, 0.001), 900.0,
     )  # fmt: skip
 

@@ -194,6 +194,9 @@ def test_settings_are_refused_by_name(tmp_path: Any) -> None:
     file.write_text("cables: {least_tension_n: 500, largest_tension_n: 100}\n")
     with pytest.raises(InvalidInput, match=r"least_tension_n is 500, expected below"):
         read_settings(file).check(8)
+    file.write_text("record_s: 9\n")  # of which one row would be left
+    with pytest.raises(InvalidFile, match=r"record_s \(line 1\): is 9, expected"):
+        read_settings(file)
     file.write_text("bodies: {gravity_m_s2: 1.62}\n")
     assert read_settings(file).bodies.gravity_m_s2 == 1.62
     assert replace(HRM8, name="x").name == "x"

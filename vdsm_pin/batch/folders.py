@@ -32,9 +32,10 @@ def expanded(problems: tuple[str, ...]) -> tuple[str, ...]:
         InvalidFile: If a folder holds no problem file.
     """
     found: set[str] = set()
-    for name in problems or built_in_names():
+    known = built_in_names()
+    for name in problems or known:
         if not _is_folder(name):
-            found.add(name)
+            found.add(name if name in known else str(Path(name)))
             continue
         inside = _problem_files(Path(name))
         if not inside:
@@ -73,7 +74,7 @@ def motions(names: tuple[str, ...], problems: Set[Path]) -> tuple[str, ...]:
     found: set[str] = set()
     for name in names:
         if not Path(name).is_dir():
-            found.add(name)
+            found.add(str(Path(name)))
             continue
         beside = [p for p in Path(name).iterdir() if p.resolve() not in problems]
         inside = [p for p in beside if p.suffix.lower() in MOTIONS or is_bag(p)]

@@ -313,3 +313,26 @@ def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
     x, y, z, w = quaternion
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + 2.0 * (w * cross + cross @ cross))
+
+
+def quaternions(rotations: FloatArray) -> FloatArray:
+    """Quaternions (x, y, z, w) of rotation matrices, of either sign; [-].
+
+    Args:
+        rotations: Shape (..., 3, 3); [-].
+
+    Returns:
+        Shape (..., 4).
+    """
+    R, Rt = rotations, np.swapaxes(rotations, -1, -2)
+    products = np.zeros((*R.shape[:-2], 4, 4))  # 4 q q^T, of which any row will do
+    products[..., :3, :3] = R + Rt
+    turn = (R - Rt)[..., (2, 0, 1), (1, 2, 0)]
+    products[..., :3, 3] = products[..., 3, :3] = turn
+    trace = np.trace(R, axis1=-2, axis2=-1)
+    each = np.arange(3)
+    products[..., each, each] += (1.0 - trace)[..., None]
+    products[..., 3, 3] = 1.0 + trace
+    largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
+    rows = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    return np.asarray(rows / np.linalg.norm(rows, axis=-1, keepdims=True))

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, quaternions
 from vdsm_pin.geometry.solids import Solid
 from vdsm_pin.problem.any_problem import AnyMotion, AnyProblem
 from vdsm_pin.problem.scene import Moving, Obstacle, solid_of
@@ -47,7 +47,7 @@ def moves(obstacle: Obstacle, trajectory: AnyMotion) -> dict[str, Any]:
     if times is None:
         times = obstacle.carrier.path.own_times[:1]
     poses = obstacle.poses(times)
-    turns = np.array([quaternion(pose[:3, :3]) for pose in poses])
+    turns = quaternions(poses[:, :3, :3])
     return {
         "moves": {
             "moments": packed(moments, "<f8"),
@@ -77,26 +77,6 @@ def subdivided(knots: FloatArray, parts: IntArray) -> FloatArray:
     pairs = zip(knots[:-1], knots[1:], parts, strict=True)
     told = [np.linspace(a, b, n, endpoint=False) for a, b, n in pairs]
     return np.concatenate([*told, knots[-1:]])
-
-
-def quaternion(turn: FloatArray) -> FloatArray:
-    """A rotation as (x, y, z, w), of either sign; [-]."""
-    trace = float(np.trace(turn))
-    k = int(np.argmax([*np.diag(turn), trace]))
-    found = np.zeros(4)
-    if k == 3:
-        found[:3] = (
-            turn[2, 1] - turn[1, 2],
-            turn[0, 2] - turn[2, 0],
-            turn[1, 0] - turn[0, 1],
-        )
-        found[3] = 1.0 + trace
-    else:
-        i, j = (k + 1) % 3, (k + 2) % 3
-        found[k] = 1.0 + 2.0 * turn[k, k] - trace
-        found[i], found[j] = turn[i, k] + turn[k, i], turn[j, k] + turn[k, j]
-        found[3] = turn[j, i] - turn[i, j]
-    return np.asarray(found / np.linalg.norm(found))
 
 
 class Silhouette(NamedTuple):

@@ -10,9 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, quaternions
 from vdsm_pin.problem.scene import Moving, solid_of
-from vdsm_pin.report.drawing import Drawing, quaternion, told_moments
+from vdsm_pin.report.drawing import Drawing, told_moments
 from vdsm_pin.report.palette import OBSTACLE_EDGE, PATH
 from vdsm_pin.report.solids import Surface, detail, surface
 
@@ -37,7 +37,9 @@ def glb(drawing: Drawing, seconds: float | None = None) -> bytes:
         seconds: How long it plays, see `play_times`; [s].
     """
     file, problem, moments = _File(), drawing.problem, _told(drawing)
-    clock = file.times(play_times(drawing, moments, seconds))
+    times = play_times(drawing, moments, seconds).astype("<f4")
+    rising = np.append(True, np.diff(times) > 0.0)  # an arm may rest
+    moments, clock = moments[rising], file.values(times[rising])
     nodes = []
     for part in drawing.parts(moments):
         mesh = file.mesh(part.name, part.skin, part.colour)
@@ -134,10 +136,6 @@ class _File:
         )
         return len(self.accessors) - 1
 
-    def times(self, times: FloatArray) -> int:
-        """The moments of the animation; [s]."""
-        return self.values(times)
-
     def node(self, **fields: Any) -> int:
         """A node with these properties."""
         self.nodes.append(fields)
@@ -187,7 +185,7 @@ class _File:
         self, node: int, clock: int, places: FloatArray, turns: FloatArray
     ) -> None:
         """Animate a node: places (n, 3) [m] and rotations (n, 3, 3) [-]."""
-        around = np.array([quaternion(turn) for turn in turns])
+        around = quaternions(turns)
         for k in range(1, len(around)):  # either sign is right; the nearer one is short
             if around[k] @ around[k - 1] < 0.0:
                 around[k] = -around[k]

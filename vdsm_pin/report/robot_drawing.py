@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, quaternions
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.proof.bodies import Body
@@ -20,7 +20,6 @@ from vdsm_pin.report.drawing import (
     Part,
     Silhouette,
     obstacle_data,
-    quaternion,
     row_data,
     subdivided,
 )
@@ -101,7 +100,7 @@ class RobotDrawing:
     def _stances(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Middles and turns of the links at rows of q, (n_links, n_rows, 3 and 4)."""
         places, turns = self._frames(q)
-        return places, np.array([[quaternion(one) for one in each] for each in turns])
+        return places, quaternions(turns)
 
     def _frames(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Middles and turns of the links at rows of q, (n_links, n_rows, ..)."""

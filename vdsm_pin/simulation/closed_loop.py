@@ -42,8 +42,7 @@ class Simulation:
         planned: x0, alpha1, theta1, .. as planned, shape (m, 1 + 2N); [m], [rad].
         executed: The same as executed.
         tensions: Of the cables, shape (m, 3N); [N].
-        on_path: Whether the planned tip is on the path, shape (m,).
-        path_m: Its arc length along the path, shape (m,); [m].
+        path_m: Arc length of the planned tip along the path, shape (m,); [m].
         least_stiffness: Least joint stiffness at some times, shape (k, 2): time and
             value; [s], [N m/rad].
         tension_margin: What may be added to every tension before the arm buckles, at
@@ -57,7 +56,6 @@ class Simulation:
     planned: FloatArray
     executed: FloatArray
     tensions: FloatArray
-    on_path: FloatArray
     path_m: FloatArray
     least_stiffness: FloatArray
     tension_margin: FloatArray
@@ -259,7 +257,6 @@ class _Loop:
             planned=planned,
             executed=np.array([row for _, row in rows]),
             tensions=np.array(tensions),
-            on_path=plan.on_path[nearest],
             path_m=plan.path_m[nearest],
             least_stiffness=np.column_stack([kept[at], stiffness]),
             tension_margin=np.column_stack([kept[at], margin]),

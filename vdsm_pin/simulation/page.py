@@ -64,7 +64,6 @@ def thinned(found: Simulation) -> Simulation:
         at(found.planned),
         at(found.executed),
         at(found.tensions),
-        np.interp(times, found.times, found.on_path),
         np.interp(times, found.times, found.path_m),
         at(stiffness, stiffness[:, 0]),
         at(found.tension_margin, found.tension_margin[:, 0]),

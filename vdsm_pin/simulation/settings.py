@@ -131,7 +131,9 @@ class Settings(FileModel):
     kicks: Annotated[tuple[Kick, ...], Field(strict=False)] = ()
     seed: int = Field(default=0, ge=0, description="of the noise")
     step_s: Positive = Field(default=0.0005, description="of the integrator, at most")
-    record_s: Positive = Field(default=0.02, description="between recorded rows")
+    record_s: Annotated[Positive, Field(le=0.1)] = Field(
+        default=0.02, description="between recorded rows"
+    )
 
     def check(self, n_links: int) -> None:
         """Refuse what contradicts itself or an arm of N links.
