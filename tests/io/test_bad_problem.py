@@ -298,6 +298,13 @@ def test_one_wrong_value_is_refused_in_one_sentence(
     assert expected in refused_text(tmp_path, edited(OBS1, location, value))
 
 
+def test_a_wrong_version_is_told_before_all_else(tmp_path: Path) -> None:
+    """A file of another version has keys of its own, wherever it says which it is."""
+    body = edited(OBS1, ("vdsm_problem",))
+    text = f"colour: red\n{body}\nvdsm_problem: 2\n"
+    assert refused_text(tmp_path, text).startswith("vdsm_problem (line ")
+
+
 NO_PATH = edited(OBS1, ("tip_path",))
 ENDS: list[tuple[tuple[Any, ...], Any, str]] = [
     (("goal",), {}, "goal (line 16): has neither of tip and joints, expected one"),

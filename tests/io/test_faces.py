@@ -167,6 +167,16 @@ def test_the_bend_of_a_face_bounds_how_far_other_cuts_are_off() -> None:
     assert cut_faces(flat, np.arange(4), np.array([4])).bend == 0.0
 
 
+def test_the_bend_of_a_face_is_the_same_far_away() -> None:
+    """Of corners that lie as exactly there."""
+    quad = np.array([[0, 0, 0], [1, 0, 0.25], [1, 1, 0.5], [0, 1, 0.5]])
+    here, there = (
+        cut_faces(quad + away, np.arange(4), np.array([4])).bend
+        for away in (0.0, 2.0**30)
+    )
+    assert here == pytest.approx(there, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     "polygon",
     [

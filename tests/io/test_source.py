@@ -10,6 +10,7 @@ from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.source import (
     BLOCK,
     bounded_lines,
+    check_is_file,
     check_unchanged,
     naming_file,
     opened,
@@ -68,3 +69,8 @@ def test_what_names_no_file_is_told() -> None:
     for value in (None, 7, b"a", ["a"]):
         with pytest.raises(InvalidInput, match=f"found {type(value).__name__}$"):
             path_of(value)
+
+
+def test_a_name_longer_than_any_file_has_is_refused() -> None:
+    with pytest.raises(InvalidFile, match="cannot be opened: "):
+        check_is_file(Path("a" * 300))
