@@ -255,3 +255,28 @@ def test_of_two_sides_the_one_at_rest_or_of_more_pieces_is_the_partner(
         both = PairTable.of([Pair(5, 6)])
         with pytest.raises(ValueError, match="'half' and 'other' are both unbounded"):
             planned_parts(tree, [*bodies, Body(0, (half,), "other")], both)
+
+
+def test_bodies_are_found_among_the_packed_ones() -> None:
+    """Those that move in a pair are packed last, and parts and versions after them."""
+    rng, tree = np.random.default_rng(5), Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    many = Hull(rng.normal(size=(200, 3)))
+    balls = tuple(Hull(rng.normal(size=(1, 3)), 0.1) for _ in range(3))
+    bodies = [
+        Body(1, (many,), "many"),
+        Body(0, balls[:1], "ball"),
+        Body(1, balls, "balls"),
+        Body(0, balls[1:], "both"),
+    ]
+    asked = Question.of(tree, bodies, PairTable.of([Pair(0, 1), Pair(2, 3)]))
+    assert sorted(asked.places) == [*range(len(bodies))]
+    assert asked.number[asked.places].tolist() == [*range(len(bodies))]
+    names = [asked.plan.bodies[place].name for place in asked.places]
+    assert names == ["many", "ball", "balls", "both"]
+
+
+def test_a_body_with_a_half_space_is_not_bounded() -> None:
+    ball, floor = Hull(np.zeros((1, 3)), 0.1), HalfSpacePiece(np.eye(3)[2], -2.0)
+    for pieces in ((floor,), (ball, floor), (floor, ball)):
+        assert not Body(0, pieces).is_bounded
+    assert Body(0, (ball, ball)).is_bounded

@@ -16,7 +16,7 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.recording import LOSS, record
 from vdsm_pin.proof.terms import Task
-from vdsm_pin.proof.tree import Tree
+from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.proof.workspace import new_workspace
 
 ROOM = 5_000
@@ -175,6 +175,19 @@ def test_planes_are_few_and_short(seed: int) -> None:
         best = 0.5 if row[LAST] - row[FIRST] > 1 else 1.0 - 0.05 - 0.01 - LOSS
         assert best <= row[CLAIM] <= 0.94 + 1e-9
         assert written.gaps(row).min() >= row[CLAIM] - 1e-12
+
+
+def test_a_plane_along_an_axis_is_written_with_two_digits() -> None:
+    """A hundredth of a direction is fine enough where that direction is exact."""
+    tree = Tree((Joint(0, Kind.REVOLUTE, (0.0, 0.0, 1.0), column=0),))
+    still = Path(np.zeros((INTERVALS + 1, 1)))
+    for axis in np.eye(3):
+        bodies = [Body(k, (Hull(x * axis[None], 0.1),)) for k, x in ((1, 0), (0, 2))]
+        one = Asked(tree, tuple(bodies), still, (Pair(0, 1, 0.5),))
+        _, records, (count, *_) = one.recorded()
+        assert count == INTERVALS
+        for row in records[:count]:
+            assert np.array_equal(np.abs(row[PLANE_NORMAL:CLAIM]), 100.0 * axis)
 
 
 @pytest.mark.parametrize("seed", range(6))

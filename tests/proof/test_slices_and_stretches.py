@@ -337,3 +337,16 @@ def test_a_clearance_held_serves_while_the_body_moves_less_than_the_slack() -> N
     assert proving.sweep(0, 60)
     looks = proving.results.tally[RENEWED]
     assert 1 <= looks <= ceil(moved / (0.9 * Budget().slack * 0.9)) + 1
+
+
+def test_what_rounding_alone_leaves_open_is_not_subdivided() -> None:
+    """A ball slides along a wall at exactly the clearance that is required."""
+    slide = Tree((Joint(0, Kind.PRISMATIC, (0.0, 1.0, 0.0), column=0),))
+    wall = np.array([[1.0, y, z] for y in (-9.0, 9.0) for z in (-9.0, 9.0)])
+    bodies = [Body(1, (Hull(np.zeros((1, 3)), 0.25),)), Body(0, (Hull(wall),))]
+    path, pairs = Path(np.array([[0.0], [1.0]])), PairTable.of([Pair(0, 1, 0.75)])
+    proving, _ = start_proof(slide, bodies, path, pairs)
+    dense, used = dense_of(proving)
+    assert dense.verdict[0, 0] == UNDECIDED
+    assert used <= 2
+    assert dense.lower[0, 0] == pytest.approx(0.75, abs=1e-8)

@@ -193,6 +193,11 @@ def test_rows_are_met_exactly_and_what_lies_between_by_the_polynomial(
             interpolate(motion, k, t, q)
             found = bernstein.value(path.controls[k, None], np.array([t]))[0]
             np.testing.assert_allclose(q, found, **EXACT)
+    knots = rng.normal(size=(2, 40)) * 10.0 ** rng.integers(-6, 6, (2, 40))
+    far, all_q = Path(knots).packed(), np.zeros(40)
+    for t, row in ((0.0, 0), (1.0, 1)):  # rows whose differences are rounded
+        interpolate(far, 0, t, all_q)
+        assert np.array_equal(all_q, knots[row])
     for t in (0.0, 0.4, 1.0):  # past the last row everything rests
         interpolate(motion, 3, t, q)
         assert np.array_equal(q, path.knots[3])
