@@ -12,6 +12,7 @@ from vdsm_pin.io.schema_types import (
     Positive,
     Range,
     Vector,
+    exactly,
     text_or_not,
 )
 
@@ -63,7 +64,9 @@ Lengths: TypeAlias = Annotated[
 ]
 
 
-NamePair: TypeAlias = Annotated[list[Name], Field(min_length=2, max_length=2)]
+NamePair: TypeAlias = Annotated[
+    list[Name], Field(min_length=2, max_length=2), exactly(2)
+]
 
 
 class CablesModel(FileModel):

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Final, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 from vdsm_pin.text import UNSEEN
@@ -22,14 +22,32 @@ def _no_slip(value: float) -> float:
     return value
 
 
+def exactly(count: int) -> Any:
+    """Says of a list of another length how many entries it has to have."""
+
+    def counted(value: Any) -> Any:
+        if isinstance(value, list) and len(value) != count:
+            kind, message = "wrong_length", "exactly {count} entries"
+            raise PydanticCustomError(kind, message, {"count": count})
+        return value
+
+    return BeforeValidator(counted)
+
+
 Number: TypeAlias = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive: TypeAlias = Annotated[
     float, Field(gt=0.0, le=LARGEST), AfterValidator(_no_slip)
 ]
 NotNegative: TypeAlias = Annotated[float, Field(ge=0.0, le=LARGEST)]
-Vector: TypeAlias = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Range: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
-Size: TypeAlias = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+Vector: TypeAlias = Annotated[
+    list[Number], Field(min_length=3, max_length=3), exactly(3)
+]
+Range: TypeAlias = Annotated[
+    list[Number], Field(min_length=2, max_length=2), exactly(2)
+]
+Size: TypeAlias = Annotated[
+    list[Positive], Field(min_length=3, max_length=3), exactly(3)
+]
 FileName: TypeAlias = Annotated[str, Field(min_length=1, max_length=4096)]
 
 NAME_PATTERN: Final = f"^[^\\s=+@{UNSEEN}-][^{UNSEEN}]*$"
