@@ -155,3 +155,14 @@ def test_a_shorter_list_is_refused_beside_a_whole_one() -> None:
     asked = made_up.problem().under(whole)
     with pytest.raises(InvalidInput, match="errors of 3 joints, expected 8"):
         asked.under(short)
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_repair_keeps_the_clearance_under_its_errors(tmp_path: Path) -> None:
+    _, *words, _ = write(tmp_path)
+    code, text = run(["repair", *words, "--obstacle-error-mm", "a=55.1"])
+    assert code == 1 and "a" in text, text
+    code, text = run(["repair", *words, "--obstacle-error-mm", "a=54.9"])
+    assert code == 0, text
+    told = json.loads((tmp_path / "out" / "verification.json").read_text())
+    assert told["error_box"]["obstacles"][0]["shift_m"] == pytest.approx(0.0549)

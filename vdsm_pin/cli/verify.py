@@ -203,6 +203,8 @@ def repair(
     out: OutFolder,
     *,
     problem: ProblemOrNone = None,
+    errors: ErrorOptions,
+    slide_error_mm: SlideErrors = "0",
     robot: RobotOptions,
     topic: Topic = None,
     pin: Annotated[
@@ -221,12 +223,11 @@ def repair(
     from vdsm_pin.app.motions import MotionOptions
     from vdsm_pin.app.repair import repair_to_folder
     from vdsm_pin.app.workflow import VerifyOrder
-    from vdsm_pin.problem.error_boxes import ErrorBox
     from vdsm_pin.report.terminal import show_verification
 
-    deadline = Deadline.after(time_limit)
+    deadline, box = Deadline.after(time_limit), errors.box(slide_error_mm)
     with enforced(deadline, grace=0.0):
-        asked = asked_problem(problem, ErrorBox(), robot, {}, topic)
+        asked = asked_problem(problem, box, robot, {}, topic)
     with enforced(deadline):
         options = MotionOptions(deadline, topic=topic)
         order = VerifyOrder(asked, trajectory, out, context.obj, options=options)
