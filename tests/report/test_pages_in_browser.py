@@ -111,6 +111,17 @@ def test_no_name_of_a_curve_is_cut(report: Watched) -> None:
     assert report.page.evaluate(cut) == []
 
 
+def test_below_zero_a_legend_tells_both_bounds(report: Watched) -> None:
+    told = """([lower, upper]) => {
+      const plot = vdsm.plots.find((one) => one.chart.unit === " mm");
+      const values = (value) => new Float32Array(200).fill(value);
+      const one = { values: values(lower), upper: values(upper), step: true };
+      return plot.told(one, 3); }"""
+    page = report.page
+    assert page.evaluate(told, [-45.181, -7.8151]) == "−45.19 to −7.81 mm"
+    assert page.evaluate(told, [4.1, 5.0]) == "4.10 mm"
+
+
 def test_the_arm_is_seen_in_its_colours(report: Watched) -> None:
     seen = pixels(report.page)
     assert len(np.unique((seen * 255).astype(int), axis=0)) > 500

@@ -299,6 +299,9 @@ def test_limits_are_checked_at_and_between_waypoints(
     found = verify_robot(Cell(robot, scene), past)
     refuted = [c.name for c in found.checks if c.verdict is Verdict.REFUTED]
     assert refuted == ["joint 'slide' in its limits"]
+    still = read_path(write(tmp_path, "r.csv", "turn_deg,slide_mm\n0,0\n"), robot)
+    turn = verify_robot(Cell(robot, scene), still).checks[1]
+    assert turn.limit == robot.joints[0].upper == -robot.joints[0].lower
     # From 0.39 back to it at a speed of v the slide goes v / 4 farther, the control
     # points v / 3; its limit is 0.4.
     for speed, verdict in ((0.036, "certified"), (0.044, "refuted"), (1.0, "refuted")):

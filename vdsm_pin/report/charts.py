@@ -46,7 +46,7 @@ def clearance_charts(
         "scale": "asinh",
         "limits": [limit(f"required {required:g} mm", required)],
     }
-    note = "Solid: proved lower bound. Dashed: proved upper bound."
+    note = "Solid: proved lower bound, rough below 0. Dashed: proved upper bound."
     # What is proved for the whole motion holds in every interval of it.
     least = min_clearance(verification)
     proved = -np.inf if least is None or least.lower_m is None else least.lower_m

@@ -165,14 +165,14 @@ def range_check(
     low, high = ends
 
     def beyond(q: FloatArray) -> FloatArray:
-        return np.stack([low - q[:, column], q[:, column] - high], axis=1)
+        return np.stack([q[:, column] - high, low - q[:, column]], axis=1)
 
     found = largest(pieces_of(path), beyond, slack)
     worst = found.worst(slack)
     return replace(
         row,
         verdict=found.verdict(slack),
-        worst=high + worst if found.column else low - worst,
-        limit=high if found.column else low,
+        worst=low - worst if found.column else high + worst,
+        limit=low if found.column else high,
         moment=found.moment,
     )

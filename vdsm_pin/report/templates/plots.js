@@ -275,17 +275,21 @@ class Plot {
     return one.values[k] * (1 - share) + one.values[next] * share;
   }
 
-  // A bound is rounded down: no more is told than is proved.
-  text(value, bound = false) {
+  // A bound is rounded to its safe side: no more is told than is proved.
+  text(value, round) {
     if (!Number.isFinite(value)) return "not available";
     const digits = this.chart.whole ? 0 : 2;
-    const told = bound ? Math.floor(Math.round(value * 1e6) / 1e4) / 1e2 : value;
+    const told = round ? round(Math.round(value * 1e6) / 1e4) / 1e2 : value;
     const text = told.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
     return text + this.chart.unit;
   }
 
   told(one, time) {
-    return this.text(this.value(one, time), one.step);
+    const value = this.value(one, time);
+    const text = this.text(value, one.step && Math.floor);
+    const upper = one.upper?.[Math.min(this.motion.place(time)[0], one.upper.length - 1)];
+    if (!(value < 0) || !Number.isFinite(upper)) return text; // below zero it may be rough
+    return `${text.replace(this.chart.unit, "")} to ${this.text(upper, Math.ceil)}`;
   }
 
   cursor(time) {
@@ -335,7 +339,7 @@ class Plot {
     const x = this.x(time);
     const level = this.y(best.value);
     const text = this.tip.querySelector("text");
-    text.textContent = `${best.one.name}: ${this.text(best.value, best.one.step)} at ${this.motion.moment(time)}`;
+    text.textContent = `${best.one.name}: ${this.told(best.one, time)} at ${this.motion.moment(time)}`;
     const width = text.getComputedTextLength() + 12;
     this.tip.querySelector("rect").setAttribute("width", width);
     const left = x + width + 12 > this.right ? x - width - 8 : x + 8;
