@@ -27,6 +27,7 @@ _DECIMAL_COMMA: Final = re.compile(rb"\d[ \t;]+[-+.\d]")
 """Numbers apart by other signs: commas in the same file are then decimal ones."""
 
 _BETWEEN: Final = re.compile(r"[\s,;]+")
+_QUOTED: Final = re.compile(r'^"([^"]+)"$')
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
     rows, commas, announced = [], set[int](), ""
     for number, whole in enumerate(data.decode("latin-1").split("\n"), 1):
         line = whole.partition("#")[0].partition("//")[0].strip()
-        words = [word.strip('"') for word in _BETWEEN.split(line)]
+        words = [_QUOTED.sub(r"\1", word) for word in _BETWEEN.split(line)]
         mixed = "," in line and _DECIMAL_COMMA.search(line.encode())
         if mixed:
             problem = "has commas inside numbers, expected decimal points"

@@ -39,7 +39,7 @@ def explain_to_folder(
             cannot be written.
         Infeasible: If the paper's rule has no plan.
     """
-    assert problem.path  # or it says that there is nothing to draw
+    _ = problem.path  # says where there is nothing to draw
     check_output_folder(folder)
     check_kept([folder / PAGE], problem.files)
     if problem.scene.moving:
