@@ -559,7 +559,9 @@ def run(*arguments: object) -> int:
     return int(str(ended.value.code))
 
 
-def test_trajectories_are_converted(tmp_path: Path, robot: Robot) -> None:
+def test_trajectories_are_converted(
+    tmp_path: Path, robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Of a robot and of the arm, to every format and back to the same numbers."""
     pytest.importorskip("rosbags")
     formats = [word for f in FORMATS[1:] for word in ("--also", f[1:])]
@@ -584,6 +586,16 @@ def test_trajectories_are_converted(tmp_path: Path, robot: Robot) -> None:
         assert run(*words, out / f"trajectory{ending}", "--out", back) == 0
         found = read_trajectory(back / "trajectory.csv", problem.manipulator)
         np.testing.assert_array_equal(found.joints, arm.joints)
+        if ending != ".csv":
+            judge = "verify", "paper/obs1", "--trajectory", out / f"trajectory{ending}"
+            assert run(*judge, "--out", back) == 2
+            assert f"{ending}: is no CSV; `vdsm convert" in capsys.readouterr().err
+    bag = out / "trajectory.bag"
+    for topic, status in (("/joint_trajectory", 0), ("/other", 2)):
+        assert run(*words, bag, "--topic", topic, "--out", back) == status
+    for asked in (words, ("convert", cell, "--trajectory")):
+        assert run(*asked, out / "trajectory.csv", "--topic", "a", "--out", back) == 2
+        assert "is no bag, so topic 'a' has no" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("ending", FORMATS)

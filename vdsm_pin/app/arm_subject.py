@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions, check_times, expect
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.bags import is_bag
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.io.trajectory_messages import ENDINGS
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.arm_drawing import ArmDrawing
@@ -48,7 +51,12 @@ class ArmSubject:
         return load_arm(self.problem.manipulator).urdf_sha256
 
     def read(self, file: Path) -> Trajectory:
-        """Read the motion of a file."""
+        """Read the motion of a CSV file."""
+        if is_bag(file) or file.suffix.lower() in ENDINGS:
+            problem = (
+                "is no CSV; `vdsm convert PROBLEM --trajectory FILE --out FOLDER` "
+            )
+            raise InvalidFile(file=file, problem=f"{problem}makes one of it")
         arm, joined = self.problem.manipulator, self.options.interpolation
         asked = self.problem.tip_path is not None
         motion = read_trajectory(file, arm, joined, places=asked)

@@ -36,11 +36,13 @@ class MotionFile:
         trajectory: Joint angles.
         centres: Joint centres.
         cables: Cable lengths.
+        topic: Of the trajectory, where it is a bag; None for the only one.
     """
 
     trajectory: Path | None = None
     centres: Path | None = None
     cables: Path | None = None
+    topic: str | None = None
 
     @property
     def file(self) -> Path:
@@ -63,12 +65,15 @@ class MotionFile:
         Raises:
             InvalidFile: If it breaks its contract or no posture of the arm fits it.
         """
+        if self.topic is not None and not is_bag(self.file):
+            wrong = f"is no bag, so topic {self.topic!r} has no meaning"
+            raise InvalidFile(file=self.file, problem=wrong)
         if self.centres is not None:
             return read_centres(self.centres, problem)
         if self.cables is not None:
             return read_cables(self.cables, problem)
         if is_bag(self.file) or self.file.suffix.lower() in ENDINGS:
-            return read_arm_message(self.file, problem.manipulator)
+            return read_arm_message(self.file, problem.manipulator, self.topic)
         asked = problem.tip_path is not None
         return read_trajectory(self.file, problem.manipulator, places=asked)
 
@@ -104,12 +109,14 @@ def convert_to_folder(
     return motion
 
 
-def convert_robot(cell: Cell, file: Path, folder: Path, also: Sequence[str]) -> int:
+def convert_robot(
+    cell: Cell, given: MotionFile, folder: Path, also: Sequence[str]
+) -> int:
     """Write a robot's trajectory of any format as trajectory.csv, and in others.
 
     Args:
         cell: The robot.
-        file: The trajectory.
+        given: Its trajectory.
         folder: Where the files go.
         also: Formats besides, as of `convert_to_folder`.
 
@@ -119,11 +126,12 @@ def convert_robot(cell: Cell, file: Path, folder: Path, also: Sequence[str]) -> 
     Raises:
         InvalidInput: If the file is bad or the folder cannot be written.
     """
+    file = given.file
     check_output_folder(folder)
     names = (TRAJECTORY, *map(message_name, also))
     check_kept([folder / name for name in names], [*cell.files, file])
     robot = cell.robot
-    motion = read_motion(file, robot.joints, values=robot.values)
+    motion = read_motion(file, robot.joints, given.topic, robot.values)
     with staged(folder) as staging:
         (staging / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")
         write_messages(staging, motion, also)
@@ -149,13 +157,15 @@ def write_messages(folder: Path, motion: JointTrajectory, also: Sequence[str]) -
             write_bag(motion, file)
 
 
-def read_arm_message(file: Path, arm: Manipulator) -> Trajectory:
+def read_arm_message(
+    file: Path, arm: Manipulator, topic: str | None = None
+) -> Trajectory:
     """A motion of the arm by the joints of its URDF: x0, alpha1, theta1, ..
 
     Raises:
         InvalidFile: If a joint is missing, or a value so large that its unit is wrong.
     """
-    found = read_bag(file) if is_bag(file) else read_joint_trajectory(file)
+    found = read_bag(file, topic) if is_bag(file) else read_joint_trajectory(file)
     names = joint_names(arm.n_links)
     missing = [name for name in names if name not in found.names]
     if missing:

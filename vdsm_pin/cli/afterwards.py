@@ -18,7 +18,7 @@ from vdsm_pin.cli.options import (
     family,
     grouped,
 )
-from vdsm_pin.cli.robot import refuse_beside
+from vdsm_pin.cli.robot import Topic, refuse_beside
 from vdsm_pin.text import printable
 
 commands = family()
@@ -160,7 +160,7 @@ def convert(
     out: OutFolder,
     trajectory: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Joint angles, as trajectory.csv."),
+        typer.Option(metavar="FILE", help="Joint angles, CSV, YAML, JSON or bag."),
     ] = None,
     centres: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Joint centres, as centres.csv.")
@@ -172,6 +172,7 @@ def convert(
         list[Format] | None,
         typer.Option(help="Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
     ] = None,
+    topic: Topic = None,
     *,
     answer: Answer,
 ) -> None:
@@ -185,7 +186,7 @@ def convert(
     from vdsm_pin.app.subjects import read_problem_or_cell
     from vdsm_pin.problem.planning_problem import PlanningProblem
 
-    given = MotionFile(trajectory, centres, cables)
+    given = MotionFile(trajectory, centres, cables, topic)
     more = [one.value for one in also or ()]
     notes: tuple[str, ...] = ()
     asked = read_problem_or_cell(problem)
@@ -194,7 +195,7 @@ def convert(
         count, notes = motion.n_samples, motion.notes
     else:
         refuse_beside("a robot", {"--centres": centres, "--cables": cables})
-        count = convert_robot(asked, given.file, out, more)
+        count = convert_robot(asked, given, out, more)
     lines = [printable(f"note: {note}") for note in notes]
     lines.append(f"wrote {count} waypoints to {out}")
     answer.tell("\n".join(lines), waypoints=count, folder=out, notes=notes)

@@ -177,7 +177,7 @@ def _verify_and_tell(order: "VerifyOrder", answer: Answer) -> bool:
         what = f"none: {none}" if none else str(order.certificate)
         written.append(("certificate", what))
         beside = problem_beside(order.certificate)
-        if not none and beside in order.problem.files:
+        if beside in order.problem.files:
             written.append(("its problem file", str(beside)))
     if order.pdf is not None:
         written.append(("report on paper", str(order.pdf)))
