@@ -74,7 +74,7 @@ def run_on_cluster(tasks: Sequence[Task], address: str) -> Iterator[Ended[Task, 
         address: Such as `tcp://host:8786`.
 
     Yields:
-        Each task when it ends, in any order. Its `aside` is where the worker wrote.
+        Each task when it ends, in any order. Its `staging` is where the worker wrote.
 
     Raises:
         InvalidInput: If there is no scheduler, or a worker cannot do the work.
@@ -162,8 +162,8 @@ def _run(errand: _Errand) -> list[Ended[Task, Done]]:
 
 def _attempt(task: Task) -> Task:
     """The task with a folder of this attempt alone."""
-    name = f"{task.aside.name}.{uuid.uuid4().hex[:8]}"
-    return replace(task, aside=task.aside.with_name(name))
+    name = f"{task.staging.name}.{uuid.uuid4().hex[:8]}"
+    return replace(task, staging=task.staging.with_name(name))
 
 
 def _difference(ours: dict[str, Any], theirs: dict[str, Any]) -> str:

@@ -93,10 +93,10 @@ def write_manifest(
     task: Task, row: BatchRow, digest: str, asked: dict[str, str]
 ) -> None:
     """Write manifest.json, which makes the folder a finished one."""
-    task.aside.mkdir(parents=True, exist_ok=True)
-    files = {path.name: sha256_of_file(path) for path in sorted(task.aside.iterdir())}
+    task.staging.mkdir(parents=True, exist_ok=True)
+    files = {path.name: sha256_of_file(path) for path in sorted(task.staging.iterdir())}
     manifest = ManifestFile(problem_sha256=digest, settings=asked, row=row, files=files)
-    (task.aside / MANIFEST).write_text(manifest.text(), encoding="utf-8")
+    (task.staging / MANIFEST).write_text(manifest.text(), encoding="utf-8")
 
 
 def finished(task: Task, digest: str, asked: dict[str, str]) -> BatchRow | None:

@@ -57,11 +57,11 @@ RUNNING: Final = "running.csv"
 JUNIT: Final = "junit.xml"
 INDEX: Final = "index.html"
 SECONDS: Final = "timing.js"
-_ASIDE: Final = ".unfinished"
+_STAGING: Final = ".unfinished"
 _LOCK: Final = ".lock"
 
 
-OWN: Final = SUMMARY, RUNNING, COLUMNS, JUNIT, INDEX, SECONDS, _ASIDE, _LOCK
+OWN: Final = SUMMARY, RUNNING, COLUMNS, JUNIT, INDEX, SECONDS, _STAGING, _LOCK
 """What a batch writes beside the folders of its problems."""
 
 
@@ -112,7 +112,7 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
     batch.folder.mkdir(parents=True, exist_ok=True)
     with writing(batch.folder), _locked(batch.folder), _stoppable() as stop:
         rows: list[BatchRow] = []
-        with progress(len(tasks), batch.quiet) as show, _fresh_aside(batch.folder):
+        with progress(len(tasks), batch.quiet) as show, _fresh_staging(batch.folder):
             with summary_csv(batch.folder / RUNNING) as so_far:
                 try:
                     for ended in _all_ended(batch, tasks):
@@ -141,13 +141,13 @@ def _count(rows: Sequence[BatchRow], tasks: Sequence[Task]) -> str:
 
 
 @contextmanager
-def _fresh_aside(folder: Path) -> Iterator[None]:
-    """A block before and after which nothing lies aside, whoever was killed before."""
-    shutil.rmtree(folder / _ASIDE, ignore_errors=True)
+def _fresh_staging(folder: Path) -> Iterator[None]:
+    """A block before and after which nothing is staged, whoever was killed before."""
+    shutil.rmtree(folder / _STAGING, ignore_errors=True)
     try:
         yield
     finally:
-        shutil.rmtree(folder / _ASIDE, ignore_errors=True)
+        shutil.rmtree(folder / _STAGING, ignore_errors=True)
 
 
 def _all_ended(batch: Batch, tasks: list[Task]) -> Iterator[Ended[Task, Done]]:
@@ -169,14 +169,14 @@ def _tasks(batch: Batch) -> list[Task]:
     jobs = jobs_by_name(problems, given)
     names = folder_names(tuple(jobs), OWN)
     _check_own(batch.folder)
-    files = [batch.folder / name for name in OWN if name != _ASIDE]
+    files = [batch.folder / name for name in OWN if name != _STAGING]
     check_kept(files, map(Path, (*problems, *filter(None, given))))
     tasks = []
     for job, name in names.items():
         problem, motion = jobs[job]
-        final, aside = batch.folder / name, batch.folder / _ASIDE / name
+        final, staging = batch.folder / name, batch.folder / _STAGING / name
         _check_replaceable(final)
-        tasks.append(Task(problem, final, aside, batch.settings, motion))
+        tasks.append(Task(problem, final, staging, batch.settings, motion))
     return tasks
 
 
@@ -209,12 +209,12 @@ def _settle(ended: Ended[Task, Done]) -> Done:
     if done is not None and done.kept:
         return done
     if done is None:
-        shutil.rmtree(task.aside, ignore_errors=True)
+        shutil.rmtree(task.staging, ignore_errors=True)
         done = Done(failed_row(task, ended.outcome, ended.reason), kept=False)
         write_manifest(task, done.row, "", task.depends_on())
     if task.final.exists():
-        task.final.rename(task.aside.with_name(f"{task.final.name}.replaced"))
-    task.aside.rename(task.final)
+        task.final.rename(task.staging.with_name(f"{task.final.name}.replaced"))
+    task.staging.rename(task.final)
     return done
 
 
@@ -224,12 +224,12 @@ def _write_summaries(batch: Batch, rows: list[BatchRow]) -> None:
     seconds = {row.folder: seconds_of(folder / row.folder) for row in ordered}
     known = {name: value for name, value in seconds.items() if value is not None}
     script = f"window.vdsmTiming = {json.dumps(known, indent=1)};\n"
-    with staged(folder, folder / _ASIDE) as aside:
-        write_summary(aside / SUMMARY, ordered)
-        write_columns(aside / COLUMNS, ordered)
-        write_text(aside / JUNIT, junit_text(ordered))
-        write_index(aside / INDEX, ordered, _pages(batch, ordered))
-        write_text(aside / SECONDS, script)
+    with staged(folder, folder / _STAGING) as staging:
+        write_summary(staging / SUMMARY, ordered)
+        write_columns(staging / COLUMNS, ordered)
+        write_text(staging / JUNIT, junit_text(ordered))
+        write_index(staging / INDEX, ordered, _pages(batch, ordered))
+        write_text(staging / SECONDS, script)
 
 
 def _pages(batch: Batch, rows: list[BatchRow]) -> dict[str, str]:

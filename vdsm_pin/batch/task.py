@@ -74,14 +74,14 @@ class Task:
     Args:
         problem: Built-in name or path, as the user gave it.
         final: The folder of its results.
-        aside: The folder that the worker writes, which then becomes `final`.
+        staging: The folder that the worker writes, which then becomes `final`.
         settings: How it is done.
         trajectory: A given motion, which is verified as it is; None to plan one.
     """
 
     problem: str
     final: Path
-    aside: Path
+    staging: Path
     settings: Settings
     trajectory: str | None = None
 
@@ -123,7 +123,7 @@ class Done:
 
     Args:
         row: The summary's row.
-        kept: Whether an earlier result stays; otherwise `aside` holds a new one.
+        kept: Whether an earlier result stays; otherwise `staging` holds a new one.
         unwritten: Why no result could be written; empty where it was.
     """
 

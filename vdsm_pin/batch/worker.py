@@ -1,4 +1,4 @@
-"""The worker of a batch: plans, verifies and writes the folder of one problem aside."""
+"""The worker of a batch: plans, verifies and writes a problem's staging folder."""
 
 import shutil
 import time
@@ -48,7 +48,7 @@ from vdsm_pin.verification.records import Verdict
 def perform(task: Task) -> Done:
     """Do one problem in a worker; whatever goes wrong becomes its row."""
     try:
-        with writing(task.aside):
+        with writing(task.staging):
             return _performed(task)
     except CannotWrite as error:
         row = failed_row(task, "error", str(error))
@@ -57,7 +57,7 @@ def perform(task: Task) -> Done:
 
 def _performed(task: Task) -> Done:
     started, deadline = time.monotonic(), Deadline.after(task.settings.time_limit)
-    shutil.rmtree(task.aside, ignore_errors=True)
+    shutil.rmtree(task.staging, ignore_errors=True)
     digest, asked = "", task.depends_on()  # before the motion is read
     try:
         with enforced(deadline, grace=0.0):
@@ -81,12 +81,12 @@ def _performed(task: Task) -> Done:
     except Exception as error:  # noqa: BLE001  a batch outlives any one problem
         row = failed_row(task, "error", f"{type(error).__name__}: {error}")
     if not task.settings.keeps_files(row):
-        shutil.rmtree(task.aside, ignore_errors=True)
+        shutil.rmtree(task.staging, ignore_errors=True)
     elif not row.waypoints:
-        _clear(task.aside)
+        _clear(task.staging)
     write_manifest(task, row, digest, asked)
     timing = TimingFile(seconds=round(time.monotonic() - started, 3))
-    (task.aside / TIMING).write_text(timing.text(), encoding="utf-8")
+    (task.staging / TIMING).write_text(timing.text(), encoding="utf-8")
     return Done(row, kept=False)
 
 
@@ -121,17 +121,17 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
     if task.trajectory is None:
         assert isinstance(problem, PlanningProblem)
         plan = plan_to_folder(
-            problem, task.strategy, task.aside, task.command, deadline, report=False
+            problem, task.strategy, task.staging, task.command, deadline, report=False
         )
         if problem.scene.obstacles:  # without any, little is compiled
             note_planned()
     order = VerifyOrder(
         problem,
-        Path(task.trajectory) if task.trajectory else task.aside / TRAJECTORY,
-        task.aside,
+        Path(task.trajectory) if task.trajectory else task.staging / TRAJECTORY,
+        task.staging,
         task.command,
-        certificate=task.aside / CERTIFICATE if asked.certificate else None,
-        pdf=task.aside / PDF if asked.pdf else None,
+        certificate=task.staging / CERTIFICATE if asked.certificate else None,
+        pdf=task.staging / PDF if asked.pdf else None,
         options=MotionOptions(deadline),
     )
     verified = verify_to_folder(order)
@@ -143,7 +143,7 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
     if planned and deadline.passed and verified.records.verdict not in HANDED_OUT:
         raise OutOfTime(deadline.limit, "a plan was found and proved, but not reported")
     drawing = picture(verified.records)
-    (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
+    (task.staging / PICTURE).write_text(drawing, encoding="utf-8")
     row = batch_row(task.final.name, task.strategy, verified.content)
     known = {"problem": printable(task.problem)}
     # The planner knows why it left something out, the verification does not.

@@ -1,4 +1,4 @@
-"""Result folders: files are written aside and moved in whole, or not at all."""
+"""Result folders: files are staged and moved in whole, or not at all."""
 
 import fcntl
 import os
@@ -124,18 +124,18 @@ def staged(folder: Path, within: Path | None = None) -> Iterator[Path]:
         with ExitStack() as stack:
             with locked(folder):
                 _remove_abandoned(within)
-                aside = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=within))
-                stack.callback(shutil.rmtree, aside, ignore_errors=True)
-                stack.enter_context(locked(aside))
+                staging = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=within))
+                stack.callback(shutil.rmtree, staging, ignore_errors=True)
+                stack.enter_context(locked(staging))
             try:
-                yield aside
+                yield staging
                 with locked(folder):
-                    for path in sorted(aside.iterdir()):
+                    for path in sorted(staging.iterdir()):
                         with writing(folder / path.name):  # another user's, perhaps
                             path.replace(folder / path.name)
-            except CannotWrite as error:  # of a file aside, whose place says nothing
+            except CannotWrite as error:  # of a staged file, whose place says nothing
                 file = Path(error.file)
-                told = folder / file.name if file.parent == aside else file
+                told = folder / file.name if file.parent == staging else file
                 raise CannotWrite(file=told, reason=error.reason) from error
 
 

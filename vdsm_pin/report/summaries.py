@@ -69,7 +69,7 @@ def write_columns(path: Path, rows: Sequence[BatchRow]) -> bool:
     columns = [[getattr(row, name) for row in rows] for name in fields]
     table = pyarrow.table(columns, schema=schema)
     # Opened here: pyarrow takes no path that is not UTF-8.
-    with atomic_path(path) as aside, aside.open("wb") as file:
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
         parquet.write_table(table, file, compression="zstd")
     return True
 
