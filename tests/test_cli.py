@@ -792,6 +792,11 @@ def test_a_shell_can_be_taught_to_complete(
         "vdsm plan paper/obs2": ["paper/obs2", "paper/obs2-small"],
         "vdsm plan x --strategy f": ["fewest", "follow-the-leader"],
         "vdsm batch --keep a": ["all"],
+        "vdsm verify paper/obs2": ["paper/obs2", "paper/obs2-small"],
+        "vdsm batch paper/free paper/obs1": ["paper/obs1"],
+        "vdsm problems --show paper/f": ["paper/free"],
+        "vdsm new x --from p": ["port", "paper"],
+        "vdsm schema pl": ["plan"],
     }.items():
         monkeypatch.setenv("COMP_WORDS", words)
         monkeypatch.setenv("COMP_CWORD", str(words.count(" ")))

@@ -17,6 +17,7 @@ from vdsm_pin.cli.options import (
     examples,
     family,
     grouped,
+    problems_from,
 )
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 
@@ -40,6 +41,7 @@ def batch(
             metavar="PROBLEM",
             help="Built-in names, problem files or folders of them; the built-in "
             "problems if there is none.",
+            autocompletion=problems_from,
         ),
     ] = None,
     strategy: Strategy = DEFAULT_STRATEGY,

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import wraps
 from inspect import Parameter, Signature, signature
@@ -23,15 +23,20 @@ PASSED: Final = 0
 NOT_PASSED: Final = 1
 
 
-def _strategies_from(incomplete: str) -> list[str]:
-    return [name for name in STRATEGIES if name.startswith(incomplete)]
+def from_words(words: Iterable[str]) -> Callable[[str], list[str]]:
+    """Completes what is one of some words."""
+
+    def completed(incomplete: str) -> list[str]:
+        return [word for word in words if word.startswith(incomplete)]
+
+    return completed
 
 
-def _problems_from(incomplete: str) -> list[str]:
+def problems_from(incomplete: str) -> list[str]:
     """Built-in problems; where there is none, the shell goes on with files."""
     from vdsm_pin.io.problem_file import built_in_names
 
-    return [name for name in built_in_names() if name.startswith(incomplete)]
+    return from_words(built_in_names())(incomplete)
 
 
 ProblemArgument = Annotated[
@@ -39,7 +44,7 @@ ProblemArgument = Annotated[
     typer.Argument(
         metavar="PROBLEM",
         help="A built-in name or a problem file.",
-        autocompletion=_problems_from,
+        autocompletion=problems_from,
     ),
 ]
 OutFolder = Annotated[
@@ -63,7 +68,7 @@ Strategy = Annotated[
     typer.Option(
         metavar="NAME",
         help=f"One of {', '.join(STRATEGIES)}.",
-        autocompletion=_strategies_from,
+        autocompletion=from_words(STRATEGIES),
     ),
 ]
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
+from vdsm_pin.cli.options import problems_from
 from vdsm_pin.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
 ProblemOrNone = Annotated[
     str | None,
     typer.Argument(
-        metavar="PROBLEM", help="A built-in name or a problem file; none with --urdf."
+        metavar="PROBLEM",
+        help="A built-in name or a problem file; none with --urdf.",
+        autocompletion=problems_from,
     ),
 ]
 Urdf = Annotated[

@@ -7,10 +7,31 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import NOT_PASSED, PASSED, Answer, examples, family, grouped
+from vdsm_pin.cli.options import (
+    NOT_PASSED,
+    PASSED,
+    Answer,
+    examples,
+    family,
+    from_words,
+    grouped,
+    problems_from,
+)
 from vdsm_pin.text import printable
 
 commands = family()
+
+
+def _kinds_from(incomplete: str) -> list[str]:
+    from vdsm_pin.app.new_project import KINDS
+
+    return from_words(KINDS)(incomplete)
+
+
+def _schemas_from(incomplete: str) -> list[str]:
+    from vdsm_pin.report.files import SCHEMA_NAMES
+
+    return from_words(SCHEMA_NAMES)(incomplete)
 
 
 @commands.command(
@@ -18,7 +39,12 @@ commands = family()
 )
 def problems(
     show: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Print this problem's file.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Print this problem's file.",
+            autocompletion=problems_from,
+        ),
     ] = None,
 ) -> None:
     """List the built-in problems, or print one."""
@@ -35,7 +61,13 @@ def new(
         Path, typer.Argument(metavar="NAME", help="Folder to make; names the problem.")
     ],
     kind: Annotated[
-        str, typer.Option("--from", metavar="KIND", help="snake, port, robot or paper.")
+        str,
+        typer.Option(
+            "--from",
+            metavar="KIND",
+            help="snake, port, robot or paper.",
+            autocompletion=_kinds_from,
+        ),
     ] = "snake",
     *,
     answer: Answer,
@@ -80,6 +112,7 @@ def schema(
         typer.Argument(
             metavar="FILE",
             help="problem, certificate, verification, plan, manifest or timing.",
+            autocompletion=_schemas_from,
         ),
     ] = "problem",
 ) -> None:

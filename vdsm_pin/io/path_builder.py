@@ -184,7 +184,7 @@ class PathBuilder(PostureBuilder):
         if isinstance(part, FilePart):
             return self.reading.read(part.file, read_points)
         if before is None:
-            message = "has no point before it, expected one where it begins"
+            message = "has no point before it, expected one to begin at"
             raise InvalidInput(message)
         match part:
             case ArcPart(arc=arc):
