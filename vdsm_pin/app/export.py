@@ -9,7 +9,7 @@ import numpy as np
 from vdsm_pin.app.subjects import ProblemOrCell
 from vdsm_pin.app.visualization import drawing
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.io.atomic import atomic_path, write_bytes
 from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.film import FRAMES_PER_SECOND, Shot, encode, find_encoder, pictures
 from vdsm_pin.report.folder import check_ending, check_kept, check_output_file
@@ -50,21 +50,18 @@ def export(order: ExportOrder) -> None:
     """
     _check(order)
     shown = drawing(order.problem, order.trajectory)
-    with atomic_path(order.out) as file:
-        match order.out.suffix.lower():
-            case ".glb":
-                file.write_bytes(glb(shown, order.seconds))
-            case ".png":
-                moment = _within(order.moment, shown)
-                (one,) = pictures(
-                    view_page(shown), [moment], order.shot, "png", order.out
-                )
-                file.write_bytes(one)
-            case _:
-                moments = _moments(shown, order.seconds)
-                frames = pictures(
-                    view_page(shown), moments, order.shot, "jpeg", order.out
-                )
+    match order.out.suffix.lower():
+        case ".glb":
+            write_bytes(order.out, glb(shown, order.seconds))
+        case ".png":
+            moment = [_within(order.moment, shown)]
+            page = view_page(shown)
+            (one,) = pictures(page, moment, order.shot, "png", order.out)
+            write_bytes(order.out, one)
+        case _:
+            moments, page = _moments(shown, order.seconds), view_page(shown)
+            frames = pictures(page, moments, order.shot, "jpeg", order.out)
+            with atomic_path(order.out) as file:
                 encode(frames, file, order.out)
 
 

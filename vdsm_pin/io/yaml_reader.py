@@ -2,8 +2,9 @@
 
 Works on parse events, one by one, so that neither a tag can build an object, nor deep
 nesting exhaust the stack, nor an alias expand without end. Plain scalars are read by
-the core schema of YAML 1.2: `1e-3` is a number, and `no` and `12:30` are text. Lines
-end as they do there: U+0085, U+2028 and U+2029 are signs like any other.
+the core schema of YAML 1.2, but for its hexadecimal and octal numbers: `1e-3` is a
+number; `no`, `12:30` and `0x1F` are text. Lines end as they do there: U+0085, U+2028
+and U+2029 are signs like any other.
 """
 
 import re
@@ -35,7 +36,7 @@ _WORDS: Final[dict[str, Scalar]] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
-    **dict.fromkeys((".inf", ".Inf", ".INF", "+.inf"), float("inf")),
+    **dict.fromkeys((".inf", ".Inf", ".INF", "+.inf", "+.Inf", "+.INF"), float("inf")),
     **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), float("-inf")),
     **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
 }
@@ -219,7 +220,7 @@ class _Builder:
 
 
 def _scalar(text: str) -> Scalar:
-    """A plain scalar by the core schema of YAML 1.2."""
+    """A plain scalar, see the module."""
     if text in _WORDS:
         return _WORDS[text]
     if _INTEGER.fullmatch(text) and len(text) <= MAX_INTEGER_DIGITS:
