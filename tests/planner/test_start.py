@@ -200,21 +200,23 @@ def test_clearances_are_those_of_the_pairs_that_are_held_apart(
     centres = joint_centres(
         arm, np.zeros(50), *rng.uniform(-0.4, 0.4, (2, 50, arm.n_links))
     )
-    reach = {body.name: arm.reach_of(body) for body in arm.bodies}
+    covers = {body.name: arm.round_cover(body) for body in arm.bodies}
     least = np.full((50, arm.n_links), np.inf)
     for one, name in pairs:
         link = 3 if one == "camera" else min(names.index(one) + 1, arm.n_links)
         ball = next(ball for ball in balls if ball.name == name)
-        span = (
-            arm.axis_spans[names.index(one)] if one in arm.axis_names else (0.0, None)
-        )
+        length = float(arm.link_lengths[link - 1])
+        if one in covers:
+            radius, behind, past = covers[one]
+            first, last = -behind, length + past
+        else:
+            radius = arm.axis_radii[names.index(one)]
+            first, last = arm.axis_spans[names.index(one)]
         begin, end = centres[:, link - 1], centres[:, link]
-        axis = (end - begin) / arm.link_lengths[link - 1]
-        last = span[1] or arm.link_lengths[link - 1]
-        along = ((ball.centre - begin) * axis).sum(axis=1).clip(span[0], last)
+        axis = (end - begin) / length
+        along = ((ball.centre - begin) * axis).sum(axis=1).clip(first, last)
         gap = np.linalg.norm(ball.centre - begin - along[:, None] * axis, axis=1)
         if (one, name) not in left_out:
-            radius = reach.get(one) or arm.axis_radii[names.index(one)]
             least[:, link - 1] = np.minimum(least[:, link - 1], gap - 0.1 - radius)
     found = link_clearance(task)(centres)
     np.testing.assert_allclose(found, least, atol=2e-6)

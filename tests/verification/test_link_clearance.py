@@ -12,8 +12,12 @@ import yaml
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.arm.mounted import LinkBody
+from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
@@ -28,6 +32,17 @@ ARMS: dict[str, dict[str, Any]] = {
     "tool": {"link_radius": 0.04, "tool": {"length": 0.3, "radius": 0.01}},
     "thick tool": {"link_radius": 0.02, "tool": {"length": 0.1, "radius": 0.08}},
     "body": {"link_radius": 0.05, "bodies": [BODY | {"size": [0.05, 0.05, 0.05]}]},
+    "body beyond both ends": {
+        "link_radius": 0.05,
+        "bodies": [BODY | {"center": [0.15, 0.04, 0.0], "size": [0.9, 0.05, 0.05]}],
+    },
+    "body behind a tool": {
+        "link_radius": 0.05,
+        "tool": {"length": 0.1, "radius": 0.02},
+        "bodies": [
+            BODY | {"link": 3, "center": [-0.1, 0.0, 0.05], "size": [0.3, 0.05, 0.05]}
+        ],
+    },
 }
 OBSTACLES = [
     {"name": "ball", "shape": "sphere", "center": [0.8, 0.3, 0.2], "radius": 0.05},
@@ -72,8 +87,35 @@ def test_each_link_is_as_near_as_is_proved(name: str, tmp_path: Path) -> None:
                 assert nearest <= 0.0
                 continue
             assert nearest <= high + TOLERANCES.bracket_gap
-            if name != "body":  # which counts as round about its link
+            if "body" not in name:  # which counts as round about its link
                 assert nearest >= low - TOLERANCES.bracket_gap
+
+
+def test_what_reaches_behind_its_joint_is_no_thicker_for_it() -> None:
+    """A bar of half diagonal 50 mm, 300 mm behind the last joint, beside a ball."""
+    box = Box("bar", np.array([-0.2, 0.0, 0.0]), np.eye(3), np.array([0.1, 0.03, 0.04]))
+    arm = built_in("hrm8")
+    arm = replace(arm, link_radius=0.02, bodies=(LinkBody(arm.n_links, box),))
+    joint = float(arm.stations[-2])
+    for x, expected in (
+        (joint - 0.2, 0.3 - 0.1 - 0.05),
+        (joint + 0.1, 0.3 - 0.1 - 0.05),
+        # The capsule ends 50 mm behind the bar, a link of 20 mm goes on.
+        (joint - 0.3 - 0.4, np.hypot(0.4, 0.3) - 0.1 - 0.05),
+    ):
+        ball = Sphere("ball", np.array([x, 0.3, 0.0]), 0.1)
+        problem = PlanningProblem("p", arm, Scene((ball,)), None, 0.0, np.eye(4))
+        centres = np.zeros((1, arm.n_links + 1, 3))
+        centres[0, :, 0] = arm.stations
+        for told in (
+            link_clearance(problem),
+            broad_phase(problem, link_clearance(problem)).up_to(1.0),
+        ):
+            last = float(told(centres)[0, -1])
+            assert last == pytest.approx(expected, abs=TOLERANCES.bracket_gap)
+        tip = centres[:, -1:].repeat(2, axis=1)
+        alone = np.linalg.norm(tip[0, 0] - ball.centre) - 0.1 - 0.05
+        assert link_clearance(problem)(tip, TIP)[0, 0] == pytest.approx(alone)
 
 
 @pytest.mark.parametrize(

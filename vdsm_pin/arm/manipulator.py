@@ -283,6 +283,19 @@ class Manipulator(ByValue):
         away[:, 0] -= points[:, 0].clip(0.0, self.link_lengths[body.link - 1])
         return float(np.linalg.norm(away, axis=1).max()) + grown
 
+    def round_cover(self, body: LinkBody) -> FloatArray:
+        """Radius of a capsule about a link's axis that holds a body and is no thinner.
+
+        And how far that capsule's axis goes on before O_i and past O_{i+1}, shape (3,);
+        [m].
+        """
+        points, grown = body.solid.corners, body.solid.grown
+        x, away = points[:, 0], np.hypot(points[:, 1], points[:, 2])
+        radius = max(away.max(), self.radius_of(body.link) - grown)
+        half = np.sqrt(radius**2 - away**2)
+        ends = -(x + half).min(), (x - half).max() - self.link_lengths[body.link - 1]
+        return np.array([radius + grown, max(ends[0], 0.0), max(ends[1], 0.0)])
+
     def axes(self, centres: FloatArray) -> FloatArray:
         """Ends of the axes of the links and of the tool, one after the other.
 

@@ -17,6 +17,7 @@ from vdsm_pin.geometry.obstacles import (
     obstacle_bracket,
 )
 from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.problem.held import drawn_out
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import clearance_words
@@ -221,6 +222,7 @@ def culprit(problem: PlanningProblem, centres: FloatArray) -> Culprit:
     arm, radii = problem.manipulator, problem.held.radii
     axes = arm.axes(centres[None])[0]
     segments = np.stack([axes[:-1], axes[1:]], axis=1)
+    segments = drawn_out(segments, problem.held.beyond.max(axis=2).T)
     links = np.minimum(np.arange(len(segments)) + 1, arm.n_links)
     return _nearest_of(problem, upper_distances(problem, segments), radii, links)
 

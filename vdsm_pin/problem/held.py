@@ -1,8 +1,9 @@
 """Which parts of an arm are held apart from which obstacles: all that are not ignored.
 
 An axis is that of a link or of the tool, links first; what a link carries counts as if
-it were round about it. Obstacles that the same axes are held from, by the same radii,
-are one group; without `ignore_pairs` there is one.
+it were round about it, and where it reaches beyond an end, the axis goes on. Obstacles
+that the same axes are held from, by the same radii, are one group; without
+`ignore_pairs` there is one.
 """
 
 from collections.abc import Sequence
@@ -37,6 +38,22 @@ def held_pairs(
     return held
 
 
+def drawn_out(ends: FloatArray, more: FloatArray) -> FloatArray:
+    """Straight pieces that go on beyond their ends; those that are points stay so.
+
+    Args:
+        ends: Shape (n, 2, 3); [m].
+        more: How far before the first and past the second, shape (n, 2); [m].
+    """
+    if not more.any():
+        return ends
+    way = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    unit = np.divide(way, length, out=np.zeros_like(way), where=length > 0.0)
+    first, last = more[:, :1] * unit, more[:, 1:] * unit
+    return np.stack([ends[:, 0] - first, ends[:, 1] + last], axis=1)
+
+
 @dataclass(frozen=True)
 class HeldGroup:
     """Obstacles that the same axes are held apart from, by the same radii.
@@ -45,12 +62,15 @@ class HeldGroup:
         obstacles: Their numbers in the scene, ascending, shape (k,).
         radii: How far from each axis the matter reaches that is held apart, -inf where
             none is, shape (n_axes,); [m].
+        beyond: How far each axis goes on before it begins and after it ends, shape
+            (n_axes, 2); [m].
         n_links: Number of links.
         shaft: Part of the last link that is before the tool; [-].
     """
 
     obstacles: IntArray
     radii: FloatArray
+    beyond: FloatArray
     n_links: int
     shaft: float
 
@@ -81,7 +101,8 @@ class HeldGroup:
         """
         which = np.arange(len(ends))
         if axes is None:
-            return which, ends, np.full(len(ends), self.radius)
+            every = np.broadcast_to(self.beyond.max(axis=0), (len(ends), 2))
+            return which, drawn_out(ends, every), np.full(len(ends), self.radius)
         if self.parted:
             last = np.flatnonzero(axes == self.n_links - 1)
             tool = ends[last]
@@ -91,7 +112,10 @@ class HeldGroup:
             which = np.append(which, last)
             axes = np.append(axes, np.full(len(last), self.n_links))
         held = np.isfinite(self.radii[axes])
-        return which[held], ends[held], self.radii[axes][held]
+        which, ends, axes = which[held], ends[held], axes[held]
+        # A point at the tip, or a way of it, is no axis.
+        more = np.where((axes != TIP)[:, None], self.beyond[axes], 0.0)
+        return which, drawn_out(ends, more), self.radii[axes]
 
 
 @dataclass(frozen=True)
@@ -103,12 +127,15 @@ class HeldApart:
         axes: Whether a link, or the tool, itself is, shape (n_axes, n_obstacles).
         radii: How far from each axis the matter reaches that is, the bodies that ride
             on the link included, -inf where none is, of the same shape; [m].
+        beyond: How far such bodies reach beyond begin and end of each axis, shape
+            (2, n_axes, n_obstacles); [m].
         whole: Whether links, tool and bodies are held apart from every obstacle.
     """
 
     arm: Manipulator
     axes: BoolArray
     radii: FloatArray
+    beyond: FloatArray
     whole: bool
 
     @classmethod
@@ -119,15 +146,18 @@ class HeldApart:
         axes = np.ones((n_axes, len(obstacles)), dtype=np.bool_)
         axes[: len(pairs)] = pairs[:n_axes]
         radii = np.where(axes, arm.axis_radii[:, None], -np.inf)
+        beyond = np.zeros((2, *radii.shape))
         for body in arm.bodies:
             own = [k for k, one in enumerate(bodies) if one.owner == body.name]
             held = pairs[own].any(axis=0) if own else np.ones(len(obstacles), np.bool_)
             last = n_axes if body.link == arm.n_links else body.link
-            more = np.where(held, arm.reach_of(body), -np.inf)
+            radius, *ends = arm.round_cover(body)
             on = slice(body.link - 1, last)
-            radii[on] = np.maximum(radii[on], more)
+            radii[on] = np.maximum(radii[on], np.where(held, radius, -np.inf))
+            for side, more in zip(beyond, ends, strict=True):
+                side[on] = np.maximum(side[on], np.where(held, more, 0.0))
         counted = [one.link > 0 for one in bodies]
-        return cls(arm, axes, radii, bool(pairs[counted].all()))
+        return cls(arm, axes, radii, beyond, bool(pairs[counted].all()))
 
     def numbers(self, axes: Axes, shape: tuple[int, int]) -> IntArray | None:
         """The axis of each piece, row after row, shape (n * m,); None for any."""
@@ -149,12 +179,16 @@ class HeldApart:
         """The groups of obstacles that anything of the axes is held apart from."""
         arm = self.arm
         shaft = float(arm.axis_spans[arm.n_links - 1, 1] / arm.link_lengths[-1])
-        columns, group = np.unique(self.radii, axis=1, return_inverse=True)
-        return tuple(
-            HeldGroup(np.flatnonzero(group.ravel() == k), column, arm.n_links, shaft)
-            for k, column in enumerate(columns.T)
-            if np.isfinite(column).any()
-        )
+        every = np.vstack([self.radii, *self.beyond])
+        columns, group = np.unique(every, axis=1, return_inverse=True)
+        found = []
+        for k, column in enumerate(columns.T):
+            radii, *beyond = np.split(column, 3)
+            if np.isfinite(radii).any():
+                obstacles = np.flatnonzero(group.ravel() == k)
+                sides = np.stack(beyond, axis=1)
+                found.append(HeldGroup(obstacles, radii, sides, arm.n_links, shaft))
+        return tuple(found)
 
     @cached_property
     def cuts(self) -> BoolArray:
@@ -165,6 +199,7 @@ class HeldApart:
         cuts = np.zeros(self.arm.n_links + 1, dtype=np.bool_)
         for one in self.groups:
             links = one.radii[: one.n_links]
-            cuts[1:-1] |= links[1:] != links[:-1]
+            longer = one.beyond[: one.n_links].max(axis=1) > 0.0
+            cuts[1:-1] |= (links[1:] != links[:-1]) | longer[1:] | longer[:-1]
             cuts[-2] |= one.parted
         return cuts

@@ -12,7 +12,7 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
-from vdsm_pin.problem.held import Axes
+from vdsm_pin.problem.held import Axes, drawn_out
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import covers_of
 from vdsm_pin.proof.budget import rounding_pad
@@ -104,9 +104,12 @@ def _from_held(problem: PlanningProblem) -> Callable[..., FloatArray]:
         if axes is None and shape[1] == arm.n_links:
             rows = _axes(arm, rows)
             least = np.full((len(rows), rows.shape[1] - 1), np.inf)
+            pieces = np.stack([rows[:, :-1], rows[:, 1:]], axis=2).reshape(-1, 2, 3)
             for group, scene in zip(groups, packed, strict=True):
-                gaps = link_clearances(*scene, rows, 0.0, pad, goal) - group.radii
-                np.minimum(least, gaps, out=least)
+                beyond = np.tile(group.beyond, (len(rows), 1))
+                some = drawn_out(pieces, beyond)
+                gaps = link_clearances(*scene, some, 0.0, pad, goal)
+                np.minimum(least, gaps.reshape(least.shape) - group.radii, out=least)
             return _by_link(arm, least)
         ends = np.stack([rows[:, :-1], rows[:, 1:]], axis=2).reshape(-1, 2, 3)
         number = problem.held.numbers(axes, shape)
