@@ -12,9 +12,7 @@ from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.report.folder import (
     CERTIFICATES,
-    check_ending,
-    check_kept,
-    check_output_file,
+    check_outputs,
     problem_beside,
 )
 from vdsm_pin.robots.cell import Cell, read_cell
@@ -105,10 +103,7 @@ def stated_cell(
         InvalidInput: If the file cannot be written, or is one that is read.
     """
     path = problem_beside(certificate)
-    for output in (certificate, path):
-        check_output_file(output)
-    check_kept([certificate, path], [*cell.files, motion])
-    check_ending(certificate, *CERTIFICATES)
+    check_outputs((certificate, path), CERTIFICATES, (*cell.files, motion))
     text = problem_text(cell, files, scene, path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -19,7 +19,7 @@ from vdsm_pin.app.subjects import ProblemOrCell, read_problem_or_cell, subject_o
 from vdsm_pin.errors import InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.report.drawing import Drawing
-from vdsm_pin.report.folder import check_ending, check_kept, check_output_file
+from vdsm_pin.report.folder import check_outputs
 from vdsm_pin.report.html import message_page, view_page
 
 HOST: Final = "127.0.0.1"
@@ -44,11 +44,9 @@ def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
     Raises:
         InvalidInput: If a file is bad or the page cannot be written.
     """
-    check_output_file(path)
     asked = read_problem_or_cell(problem)
     motion = () if trajectory is None else (trajectory,)
-    check_kept([path], [*asked.files, *motion])
-    check_ending(path, ".html", ".htm")
+    check_outputs((path,), (".html", ".htm"), (*asked.files, *motion))
     write_text(path, view_page(drawing(asked, trajectory)))
 
 

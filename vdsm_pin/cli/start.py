@@ -146,7 +146,7 @@ def urdf(
     from vdsm_pin.arm.urdf_writer import mesh_names, urdf_text
     from vdsm_pin.io.atomic import atomic_path
     from vdsm_pin.io.problem_file import built_in_names
-    from vdsm_pin.report.folder import check_ending, check_kept, check_output_file
+    from vdsm_pin.report.folder import check_outputs
     from vdsm_pin.report.solids import obj_text
 
     known = name in BUILT_IN or name in built_in_names() or Path(name).exists()
@@ -160,10 +160,8 @@ def urdf(
         out.with_name(file): obj_text(shapes[body])
         for body, file in mesh_names(arm).items()
     }
-    for file in (out, *files):
-        check_output_file(file)
-    check_kept((out, *files), () if problem is None else problem.files)
-    check_ending(out, ".urdf", ".xml")
+    read = () if problem is None else problem.files
+    check_outputs((out, *files), (".urdf", ".xml"), read)
     for file, content in {**files, out: text}.items():
         with atomic_path(file) as path:
             path.write_text(content, encoding="utf-8")

@@ -62,6 +62,16 @@ def check_output_file(path: Path) -> None:
     check_output_folder(path.parent)
 
 
+def check_outputs(
+    outputs: Sequence[Path], endings: Sequence[str], inputs: Iterable[Path]
+) -> None:
+    """`check_output_file` and `check_kept` of outputs, `check_ending` of the first."""
+    for output in outputs:
+        check_output_file(output)
+    check_kept(outputs, inputs)
+    check_ending(outputs[0], *endings)
+
+
 def check_kept(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
     """Refuse to write over a file that is read, or two files to one place.
 
