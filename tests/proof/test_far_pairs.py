@@ -14,7 +14,7 @@ from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.proof.packing import pack_task, with_errors
-from vdsm_pin.proof.pair_sweep import Stretch
+from vdsm_pin.proof.pair_sweep import LOOSELY, Block
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.proving import dense_rows, new_results
 from vdsm_pin.proof.terms import ACROSS, CERTIFIED, UNDECIDED, Rules, Task
@@ -137,8 +137,8 @@ def test_far_pairs_are_told_as_by_loops(seed: int, nominal: bool) -> None:
     for start, count in BLOCKS:
         fill_rows(task, case.path.packed(), work.rows, start, count)
         limit, near = results.limit[ACROSS], [1]
-        stretch = Stretch(start, start, count, False, False, False)
-        n_near = settle_far(task, work, results, broad, stretch)
+        block = Block(start, start, count, LOOSELY)
+        n_near = settle_far(task, work, results, broad, block)
         bounds, when = np.full((2, 2, n), np.inf), np.zeros((2, 2, n))
         for b in range(2):
             of, asked = n + b, number[b] >= 0
@@ -245,7 +245,7 @@ def test_few_obstacles_are_all_near() -> None:
     broad = new_broad_phase(case.task, case.n_obstacles)
     results = new_results(len(case.pairs), case.n_obstacles + 2, 7, Budget())
     fill_rows(case.task, case.path.packed(), work.rows, 0, 4)
-    stretch = Stretch(0, 0, 4, False, False, False)
-    assert settle_far(case.task, work, results, broad, stretch) == len(case.pairs)
+    block = Block(0, 0, 4, LOOSELY)
+    assert settle_far(case.task, work, results, broad, block) == len(case.pairs)
     assert broad.near.tolist() == list(range(len(case.pairs)))
     assert not broad.settled.any() and np.isinf(results.profile).all()

@@ -33,7 +33,7 @@ from vdsm_pin.proof.layouts import (
     UP,
 )
 from vdsm_pin.proof.packing import with_errors
-from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
+from vdsm_pin.proof.pair_sweep import LOOSELY, Block, sweep_pair
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import Proving, dense_rows
@@ -241,8 +241,8 @@ def test_a_sweep_that_is_out_of_time_judges_nothing() -> None:
         budget = Budget(until=until)
         proving, _ = start_proof(slide, bodies, path, pairs, budget=budget)
         plain(fill_rows)(proving.task, proving.motion, proving.work.rows, 0, 3)
-        stretch = Stretch(0, 0, 3, False, False, False)
-        assert plain(sweep_pair)(proving.sweeping, 0, stretch) == (until > 0.0)
+        block = Block(0, 0, 3, LOOSELY)
+        assert plain(sweep_pair)(proving.sweeping, 0, block) == (until > 0.0)
         assert proving.results.counts.sum() == (3 if until > 0.0 else 0)
 
 

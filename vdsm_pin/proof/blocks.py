@@ -9,7 +9,7 @@ from vdsm_pin.proof.cached_planes import served
 from vdsm_pin.proof.far_pairs import merge_far
 from vdsm_pin.proof.layouts import OWN_POINT, ROW, UP, WIDTH
 from vdsm_pin.proof.least_bracket import narrow
-from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
+from vdsm_pin.proof.pair_sweep import CLOSELY, LOOSELY, YES_OR_NO, Block, sweep_pair
 from vdsm_pin.proof.plane_bounds import bound_above, bound_below
 from vdsm_pin.proof.results import Results, count_the_rest, note_block, note_upper
 from vdsm_pin.proof.row_places import fill_rows, seen
@@ -22,7 +22,7 @@ from vdsm_pin.proof.workspace import Workspace
 
 @compiled
 def _serves(
-    task: Task, work: Workspace, results: Results, pair: int, stretch: Stretch
+    task: Task, work: Workspace, results: Results, pair: int, block: Block
 ) -> bool:
     """Whether a pair's cached plane serves a whole block; its bounds are written.
 
@@ -31,18 +31,18 @@ def _serves(
     """
     plane, runs = work.planes[pair], work.runs
     mover = seen(task, work.rows, int(plane[ROW]))
-    rules, count, group = task.rules, stretch.size, task.pairs.group[pair]
+    rules, count, group = task.rules, block.size, task.pairs.group[pair]
     bound_below(mover, work.rows.tracks, runs, plane, 0, count)
     bound_above(mover, work.rows.tracks, runs, plane, 0, count)
     bar = task.pairs.required[pair]
-    if stretch.closely:
+    if block.mode == CLOSELY:
         bar = max(bar, results.limit[group] - rules.gap)
     lower, upper = runs.lower[:count], runs.upper[:count]
     if served(lower, upper, bar, rules.slack, 2.0 * plane[WIDTH]) < count:
         return False
     best = results.best[pair]
     results.counts[pair, CERTIFIED] += count
-    note_upper(best, runs, plane[OWN_POINT:WIDTH], stretch.start, 0, count)
+    note_upper(best, runs, plane[OWN_POINT:WIDTH], block.start, 0, count)
     if rules.nominal:
         results.limit[group] = min(results.limit[group], best[UP])
     return True
@@ -50,24 +50,23 @@ def _serves(
 
 @compiled(inline=False)
 def _sweep_block(
-    sweep: Sweep, near: IntArray, stretch: Stretch, settled: BoolArray
+    sweep: Sweep, near: IntArray, block: Block, settled: BoolArray
 ) -> bool:
     """All near pairs over a block whose rows are filled, as `run_sweep`."""
     task, work, results = sweep.task, sweep.work, sweep.results
-    runs, pairs, count = work.runs, task.pairs, stretch.size
+    runs, pairs, count = work.runs, task.pairs, block.size
     quick = task.rules.steady and results.dense.verdict.shape[0] == 0
     for pair in near:
-        closely = settled[pairs.group[pair]]
-        yes_or_no = stretch.yes_or_no
-        asked = Stretch(stretch.start, stretch.offset, count, closely, yes_or_no, False)
+        mode = CLOSELY if settled[pairs.group[pair]] else block.mode
+        asked = Block(block.start, block.offset, count, mode)
         segment = task.bodies.inverse[pairs.body[pair]] >= 0.0
         if not (quick and segment and _serves(task, work, results, pair, asked)):
             if not sweep_pair(sweep, pair, asked):
                 return False
-        if stretch.yes_or_no:  # all that is asked is whether everything is proved
+        if block.mode == YES_OR_NO:  # all that is asked is whether everything is proved
             continue
         lower, upper = runs.lower[:count], runs.upper[:count]
-        note_block(task, results, pair, stretch.start, lower, upper)
+        note_block(task, results, pair, block.start, lower, upper)
     return True
 
 
@@ -75,11 +74,11 @@ def _sweep_block(
 def _run_sweep(sweep: Sweep, span: tuple[int, int], yes_or_no: bool) -> bool:
     """`run_sweep` of what is borrowed."""
     task, work, results, broad = sweep.task, sweep.work, sweep.results, sweep.broad
-    block = work.rows.block
-    if task.rules.steady and block[TURNED]:
+    mode, state = YES_OR_NO if yes_or_no else LOOSELY, work.rows.block
+    if task.rules.steady and state[TURNED]:
         # Whoever asks about several error boxes leaves here what the last one added.
         work.runs.growth[:] = 0.0
-    block[TURNED] = not task.rules.steady
+    state[TURNED] = not task.rules.steady
     limit, settled = results.limit, np.zeros(2, np.bool_)
     before, (first, last) = limit.copy(), span
     for start in range(first, last, BLOCK):
@@ -91,11 +90,11 @@ def _run_sweep(sweep: Sweep, span: tuple[int, int], yes_or_no: bool) -> bool:
             settled[group] &= limit[group] < np.inf and not yes_or_no
             before[group] = limit[group]
         count = min(BLOCK, last - start)
-        stretch = Stretch(start, start - first, count, False, yes_or_no, False)
+        block = Block(start, start - first, count, mode)
         fill_rows(task, sweep.motion, work.rows, start, count)
-        n_near = settle_far(task, work, results, broad, stretch)
+        n_near = settle_far(task, work, results, broad, block)
         near = broad.near[:n_near]
-        if not _sweep_block(sweep, near, stretch, settled):
+        if not _sweep_block(sweep, near, block, settled):
             return False
     return True
 

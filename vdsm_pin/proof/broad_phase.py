@@ -14,7 +14,7 @@ from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import Measuring, obstacle_bracket
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
 from vdsm_pin.proof.far_pairs import BroadPhase, dense_far, keep_least, profile_far
-from vdsm_pin.proof.pair_sweep import Stretch
+from vdsm_pin.proof.pair_sweep import Block
 from vdsm_pin.proof.plane_bounds import place_disc
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import seen
@@ -91,12 +91,12 @@ def _settle_body(
 
 @compiled(inline=False)
 def _bound_body(
-    task: Task, work: Workspace, broad: BroadPhase, body: int, stretch: Stretch
+    task: Task, work: Workspace, broad: BroadPhase, body: int, block: Block
 ) -> None:
     """Bounds of a body over a block to all obstacles, by boxes over a few intervals."""
     rows, pair, low, high = work.rows, broad.some[body], np.zeros(3), np.zeros(3)
     gap, reach, when = broad.gap[body], broad.reach[body], broad.when
-    count, rise = stretch.size, task.rules.pad - task.bodies.radius[body]
+    count, rise = block.size, task.rules.pad - task.bodies.radius[body]
     gap[:] = reach[:] = np.inf
     length, own = count, body_box(task, rows, (0, 1), pair, low, high)
     while length > 1:
@@ -107,7 +107,7 @@ def _bound_body(
         body_box(task, rows, (first, min(first + length, count)), pair, low, high)
         box_gaps(broad.box, low, high, broad.trial[0])
         box_reaches(broad.point, low, high, rise, broad.trial[1])
-        when[0] = stretch.start + first
+        when[0] = block.start + first
         keep_least(broad.trial[0], when[0], gap, when[1])
         keep_least(broad.trial[1], when[0], reach, when[2])
     for o in range(gap.size):
@@ -117,7 +117,7 @@ def _bound_body(
 
 @compiled(inline=False)
 def settle_far(
-    task: Task, work: Workspace, results: Results, broad: BroadPhase, stretch: Stretch
+    task: Task, work: Workspace, results: Results, broad: BroadPhase, block: Block
 ) -> int:
     """Record the pairs that are far over a block and list the others.
 
@@ -126,7 +126,7 @@ def settle_far(
         work: Working space; its rows are filled.
         results: Where to write.
         broad: Where to write; `near` lists the pairs that need a closer look.
-        stretch: The block.
+        block: The block.
 
     Returns:
         The number of near pairs.
@@ -134,13 +134,13 @@ def settle_far(
     n_bodies, n_obstacles = broad.gap.shape
     if n_obstacles <= FEW:
         return broad.near.size
-    n_near, start, count = 0, stretch.start, stretch.size
+    n_near, start, count = 0, block.start, block.size
     for body in range(n_bodies):
         if broad.some[body] < 0:
             broad.gap[body, :] = broad.reach[body, :] = np.inf
             broad.far[body, :] = False
             continue
-        _bound_body(task, work, broad, body, stretch)
+        _bound_body(task, work, broad, body, block)
         upper = _nearest_upper(task, work, broad, body, start)
         if task.rules.nominal:
             results.limit[ACROSS] = min(results.limit[ACROSS], upper)
@@ -155,5 +155,5 @@ def settle_far(
         n_near += 1
     profile_far(task, results, broad, start, count)
     if results.dense.verdict.shape[0] > 0:
-        dense_far(task, results.dense, work.rows, broad, stretch.offset, count)
+        dense_far(task, results.dense, work.rows, broad, block.offset, count)
     return n_near

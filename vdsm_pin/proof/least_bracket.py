@@ -18,7 +18,7 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
+from vdsm_pin.proof.pair_sweep import AGAIN, Block, sweep_pair
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.rows import BEGIN, COUNT
@@ -77,8 +77,7 @@ def _look_again(sweep: Sweep, group: int, order: IntArray) -> int:
             start != block[BEGIN] or size != block[COUNT]
         ):  # what was judged last is there
             fill_rows(task, sweep.motion, work.rows, start, size)
-        stretch = Stretch(start, 0, size, True, False, True)
-        sweep_pair(sweep, pair, stretch)
+        sweep_pair(sweep, pair, Block(start, 0, size, AGAIN))
         for local in range(size):
             if not lower[local] < results.limit[group] - task.rules.gap:
                 continue

@@ -1,8 +1,14 @@
 """One pair over a block of intervals, in compiled code.
 
-Each pair keeps the plane and the witness point that served it last. Most intervals are
-proved by that plane alone; a pair whose bracket grows too wide gets a new one; where
-the bound misses the required clearance the interval is subdivided.
+Each pair keeps the plane and the witness point that served it last, and most intervals
+are proved by that plane alone. What an interval is tried with, and what comes next
+where that misses:
+
+1. the plane kept, with all intervals after it; next 2;
+2. a new plane of the roughest version of the pair, with a window of intervals, which
+   doubles as long as it serves; next 3, where the pair has a rough version, else 4;
+3. a new plane of the next finer version, as in 2; next 3, from the pair itself 4;
+4. subdivision, of this interval alone, then 1 from the next one on.
 """
 
 from typing import Final, NamedTuple
@@ -58,27 +64,30 @@ FIRST_TRIED: Final = 4
 ROUGH: Final = 0.1
 """Part of the slack that a new plane may miss, where it is not looked at closely."""
 
+LOOSELY: Final = 0
+"""How a block is judged: bounds need be no better than what shows them to suffice."""
+CLOSELY: Final = 1
+"""Bounds below the least clearance met are made as good as they can be."""
+YES_OR_NO: Final = 2
+"""As `LOOSELY`, up to the first interval that is not proved."""
+AGAIN: Final = 3
+"""As `CLOSELY`, of what was judged: nothing is counted, no interval subdivided."""
 
-class Stretch(NamedTuple):
+
+class Block(NamedTuple):
     """Which intervals are judged, and how.
 
     Args:
         start: First interval.
         offset: Its row in the dense results.
         size: Number of intervals, at most BLOCK.
-        closely: Whether bounds below the least clearance met are made as good as they
-            can be.
-        yes_or_no: Whether to stop at the first interval that is not proved.
-        again: Whether it is a second look: no interval is subdivided, its bound is what
-            one plane proves, or counted.
+        mode: `LOOSELY`, `CLOSELY`, `YES_OR_NO` or `AGAIN`.
     """
 
     start: int
     offset: int
     size: int
-    closely: bool
-    yes_or_no: bool
-    again: bool
+    mode: int
 
 
 @compiled(inline=False)
@@ -167,12 +176,12 @@ def _look_at_row(
 
 
 @compiled(inline=False)
-def _subdivide(sweep: Sweep, pair: int, stretch: Stretch, local: int) -> int:
+def _subdivide(sweep: Sweep, pair: int, block: Block, local: int) -> int:
     """Decide one interval of a block by subdivision; its verdict."""
     task, work, results = sweep.task, sweep.work, sweep.results
     row, witness = np.zeros(SLICE), new_witness()
     slicing = Slicing(task, sweep.motion, work.ends, work.space)
-    k = stretch.start + local
+    k = block.start + local
     row[INTERVAL], row[PAIR], row[END], row[KEY] = k, pair, 1.0, -np.inf
     witness.value[KNOWN] = results.best[pair, UP]
     verdict, count = resolve(slicing, work.heap, row, witness)
@@ -188,7 +197,7 @@ def _subdivide(sweep: Sweep, pair: int, stretch: Stretch, local: int) -> int:
         best[OWN:] = witness.points
     dense = results.dense
     if dense.verdict.shape[0] > 0:
-        m = stretch.offset + local
+        m = block.offset + local
         row[START] = row[END] = time
         place_pair(slicing, row)
         dense.lower[m, pair], dense.upper[m, pair] = lower, upper
@@ -204,7 +213,7 @@ def _subdivide(sweep: Sweep, pair: int, stretch: Stretch, local: int) -> int:
 
 
 @compiled(inline=False)
-def _dense_stretch(
+def _write_dense(
     mover: Mover,
     work: Workspace,
     results: Results,
@@ -226,26 +235,26 @@ def _dense_stretch(
 
 
 @compiled
-def _note_stretch(
+def _note_proved(
     task: Task,
     mover: Mover,
     work: Workspace,
     results: Results,
     pair: int,
-    stretch: Stretch,
+    block: Block,
     span: tuple[int, int],
 ) -> None:
     """Count and record the intervals, first to below last, that one plane proves."""
     local, done = span
     runs, best, group = work.runs, results.best[pair], task.pairs.group[pair]
-    if not stretch.again:
+    if block.mode != AGAIN:
         results.counts[pair, CERTIFIED] += done - local
     points = work.planes[pair, OWN_POINT:WIDTH]
-    note_upper(best, runs, points, stretch.start, local, done)
+    note_upper(best, runs, points, block.start, local, done)
     if task.rules.nominal:
         results.limit[group] = min(results.limit[group], best[UP])
     if results.dense.verdict.shape[0] > 0:
-        _dense_stretch(mover, work, results, pair, stretch.offset, local, done)
+        _write_dense(mover, work, results, pair, block.offset, local, done)
 
 
 @compiled
@@ -258,13 +267,8 @@ def _face(task: Task, mover: Mover, rows: Rows, plane: FloatArray, pair: int) ->
 
 
 @compiled(inline=False)
-def sweep_pair(sweep: Sweep, pair: int, stretch: Stretch) -> bool:
+def sweep_pair(sweep: Sweep, pair: int, block: Block) -> bool:
     """All intervals of a block for one pair, from first to last.
-
-    An interval is tried with the plane that served last, with all after it; where that
-    misses, with a new one of the roughest version of the pair, with a window of those
-    after it, which doubles as long as the plane serves; then with one of the next finer
-    version; what even the pair's own plane misses is subdivided.
 
     Returns:
         False where only a yes or no is asked and an interval is not proved, or where
@@ -273,14 +277,15 @@ def sweep_pair(sweep: Sweep, pair: int, stretch: Stretch) -> bool:
     Args:
         sweep: What they are judged with, its rows filled; its runs are written.
         pair: The pair.
-        stretch: The intervals.
+        block: The intervals.
     """
     task, work, results = sweep.task, sweep.work, sweep.results
     rules, rows, runs, plane = task.rules, work.rows, work.runs, work.planes[pair]
     required, group = task.pairs.required[pair], task.pairs.group[pair]
-    count, yes_or_no = stretch.size, stretch.yes_or_no
+    count, yes_or_no = block.size, block.mode == YES_OR_NO
+    closely = block.mode == CLOSELY or block.mode == AGAIN
     goal = Goal(rules.goal, 0.0, 0.0, np.inf)
-    if not stretch.closely:
+    if not closely:
         part = ROUGH * rules.slack
         # Of a segment the bracket has the witness too, of any other body the plane.
         of_clearance = part if mover_of(task, pair).inverse < 0.0 else 0.0
@@ -296,7 +301,7 @@ def sweep_pair(sweep: Sweep, pair: int, stretch: Stretch) -> bool:
     place_own(mover, rows, runs, plane, count)
     while clock() <= rules.until:
         last, bar = min(count, local + window), required
-        if stretch.closely:
+        if closely:
             bar = max(bar, results.limit[group] - rules.gap)
         demand = Demand(local, last, bar, slack, is_new, proved)
         done = local
@@ -311,15 +316,15 @@ def sweep_pair(sweep: Sweep, pair: int, stretch: Stretch) -> bool:
                 proved = _renew(task, version, work, local, pair, goal, bar)
                 continue
             # This interval allows no more, and may be proved nevertheless.
-            if runs.lower[local] >= required or stretch.again:
+            if runs.lower[local] >= required or block.mode == AGAIN:
                 done += 1
         if done > local:
             span = local, done
-            _note_stretch(task, mover, work, results, pair, stretch, span)
+            _note_proved(task, mover, work, results, pair, block, span)
         elif is_new:
             if yes_or_no and runs.upper[local] < required:
                 return False
-            verdict = _subdivide(sweep, pair, stretch, local)
+            verdict = _subdivide(sweep, pair, block, local)
             if yes_or_no and verdict != CERTIFIED:
                 return False
             done = local + 1
