@@ -35,8 +35,8 @@ from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
+    CANDIDATES,
     END,
-    HELD,
     HELD_AT,
     HELD_CLEARANCE,
     INTERVAL,
@@ -523,7 +523,7 @@ def test_blocks_are_noted_as_by_a_list_of_them(room: int, profile: int) -> None:
             lower, upper = np.sort(rng.integers(-3, 9, (2, size)), axis=0).astype(float)
             found.limit[rng.integers(2)] = rng.integers(0, 9)
             limit, best = found.limit[groups[pair]], found.best[pair].copy()
-            held = int(found.tally[HELD])
+            held = int(found.tally[CANDIDATES])
             before, over = candidates(found), found.overflow.copy()
             note_block(task, found, pair, first, lower, upper)
             for column in (0, 1 + pair) if groups[pair] == ACROSS else ():
@@ -557,7 +557,7 @@ def test_blocks_are_noted_as_by_a_list_of_them(room: int, profile: int) -> None:
 
 def candidates(found: Results) -> list[tuple[float, int, int, int]]:
     """Those held: least bound, first interval, size and pair."""
-    held, n = found.candidates, int(found.tally[HELD])
+    held, n = found.candidates, int(found.tally[CANDIDATES])
     parts = (held.lower, held.first, held.size, held.pair)
     return [*zip(*(part[:n].tolist() for part in parts), strict=True)]
 

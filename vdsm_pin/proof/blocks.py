@@ -7,7 +7,7 @@ from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.proof.broad_phase import settle_far
 from vdsm_pin.proof.cached_planes import served
 from vdsm_pin.proof.far_pairs import merge_far
-from vdsm_pin.proof.layouts import OWN_POINT, ROW, UP, WIDTH
+from vdsm_pin.proof.layouts import OWN_POINT, UP, VERSION, WIDTH
 from vdsm_pin.proof.least_bracket import narrow
 from vdsm_pin.proof.pair_sweep import CLOSELY, LOOSELY, YES_OR_NO, Block, sweep_pair
 from vdsm_pin.proof.plane_bounds import bound_above, bound_below
@@ -30,7 +30,7 @@ def _serves(
     blocks of most pairs end here.
     """
     plane, runs = work.planes[pair], work.runs
-    mover = seen(task, work.rows, int(plane[ROW]))
+    mover = seen(task, work.rows, int(plane[VERSION]))
     rules, count, group = task.rules, block.size, task.pairs.group[pair]
     bound_below(mover, work.rows.tracks, runs, plane, 0, count)
     bound_above(mover, work.rows.tracks, runs, plane, 0, count)

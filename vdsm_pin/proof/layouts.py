@@ -6,7 +6,7 @@ SUPPORT: Final = 3
 OWN_POINT: Final = 4
 POINT: Final = 7
 WIDTH: Final = 10
-ROW: Final = 11
+VERSION: Final = 11
 HELD_CLEARANCE: Final = 12
 HELD_AT: Final = 13
 """Layout of what a pair remembers: n (3), support in n, witness on the body in its
@@ -24,7 +24,7 @@ SLICE: Final = 5
 """Layout of a slice in a heap: lower bound, interval, pair, start, end."""
 
 MET: Final = 0
-WHEN: Final = 1
+MET_AT: Final = 1
 INSTANT: Final = 2
 KNOWN: Final = 3
 """Layout of a witness: least upper bound, its time, least bound of one instant, least
@@ -43,7 +43,7 @@ and time, witnesses on the body and on the partner in the base frame (3 each). U
 `place_best` they are core points, of the body in its link's frame, of the partner in
 its own."""
 
-HELD: Final = 0
+CANDIDATES: Final = 0
 SLICES: Final = 1
 RENEWED: Final = 2
 LOST: Final = 3

@@ -7,8 +7,8 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.heaps import pop, push
 from vdsm_pin.proof.layouts import (
     AT_UPPER,
+    CANDIDATES,
     END,
-    HELD,
     INTERVAL,
     KEY,
     LOW,
@@ -35,7 +35,7 @@ def _in_order(task: Task, results: Results, group: int, heap: FloatArray) -> Int
     """
     held, pairs = results.candidates, task.pairs
     row, count, n_pairs = np.zeros(SLICE), 0, pairs.rough.shape[0]
-    for c in range(results.tally[HELD]):
+    for c in range(results.tally[CANDIDATES]):
         below = held.lower[c] < results.limit[group] - task.rules.gap
         if below and pairs.group[held.pair[c]] == group:
             row[KEY], row[PAIR] = held.first[c] * n_pairs + held.pair[c], c

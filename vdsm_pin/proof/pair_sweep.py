@@ -31,19 +31,19 @@ from vdsm_pin.proof.layouts import (
     KEY,
     KNOWN,
     MET,
+    MET_AT,
     OWN,
     OWN_POINT,
     PAIR,
     POINT,
     RENEWED,
-    ROW,
     SLICE,
     SLICES,
     START,
     SUPPORT,
     TIME,
     UP,
-    WHEN,
+    VERSION,
     WIDTH,
 )
 from vdsm_pin.proof.plane_bounds import place_disc, place_own
@@ -117,7 +117,7 @@ def _renew(
     """
     pieces, space, plane = task.pieces, work.space, work.planes[pair]
     root, proved = pieces.root[task.pairs.obstacle[version]], -np.inf
-    mover, plane[ROW] = seen(task, work.rows, version), version
+    mover, plane[VERSION] = seen(task, work.rows, version), version
     p, last = pieces.node_range[root]
     load_rows(task, mover, work, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
@@ -186,7 +186,7 @@ def _subdivide(sweep: Sweep, pair: int, block: Block, local: int) -> int:
     witness.value[KNOWN] = results.best[pair, UP]
     verdict, count = resolve(slicing, work.heap, row, witness)
     results.tally[SLICES] += count
-    lower, upper, time = row[KEY], witness.value[MET], witness.value[WHEN]
+    lower, upper, time = row[KEY], witness.value[MET], witness.value[MET_AT]
     group = task.pairs.group[pair]
     results.limit[group] = min(results.limit[group], witness.value[INSTANT])
     work.runs.lower[local], work.runs.upper[local] = lower, upper
@@ -293,7 +293,7 @@ def sweep_pair(sweep: Sweep, pair: int, block: Block) -> bool:
     slack = np.inf if yes_or_no else rules.slack
     local, window, is_new, proved = 0, count, False, -np.inf
     roughest = finer(task.pairs, pair, pair)
-    version = int(plane[ROW]) if plane[SUPPORT] > -np.inf else roughest
+    version = int(plane[VERSION]) if plane[SUPPORT] > -np.inf else roughest
     mover = seen(task, rows, version)
     if not plane[SUPPORT] > -np.inf:
         _face(task, mover, rows, plane, pair)

@@ -6,7 +6,16 @@ import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, HELD, LOST, LOW, OWN, TIME, UP
+from vdsm_pin.proof.layouts import (
+    AT_LOWER,
+    AT_UPPER,
+    CANDIDATES,
+    LOST,
+    LOW,
+    OWN,
+    TIME,
+    UP,
+)
 from vdsm_pin.proof.plane_bounds import Runs
 from vdsm_pin.proof.terms import UNDECIDED, Task
 
@@ -119,13 +128,13 @@ def note_upper(
 def _drop_candidates(task: Task, results: Results) -> None:
     """Drop the candidates that can no longer hold the least bound."""
     held, kept = results.candidates, 0
-    for k in range(results.tally[HELD]):
+    for k in range(results.tally[CANDIDATES]):
         group = task.pairs.group[held.pair[k]]
         if held.lower[k] < results.limit[group] - task.rules.gap:
             held.lower[kept], held.first[kept] = held.lower[k], held.first[k]
             held.size[kept], held.pair[kept] = held.size[k], held.pair[k]
             kept += 1
-    results.tally[HELD] = kept
+    results.tally[CANDIDATES] = kept
 
 
 @compiled(inline=False)
@@ -143,19 +152,19 @@ def nominate(
     """
     held, room = results.candidates, results.candidates.lower.size
     least = lower[_least(lower)]
-    if results.tally[HELD] == room:
+    if results.tally[CANDIDATES] == room:
         # Not each time: where nothing can be dropped that would take for ever.
         if results.tally[LOST] % max(1, room // 4) == 0:
             _drop_candidates(task, results)
         results.tally[LOST] += 1
-    at = results.tally[HELD]
+    at = results.tally[CANDIDATES]
     if at == room:
         group = task.pairs.group[pair]
         results.overflow[group] = min(results.overflow[group], least)
         return
     held.lower[at], held.first[at], held.size[at] = least, first, lower.size
     held.pair[at] = pair
-    results.tally[HELD] = at + 1
+    results.tally[CANDIDATES] = at + 1
 
 
 @compiled

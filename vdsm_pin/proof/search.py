@@ -16,10 +16,10 @@ from vdsm_pin.proof.layouts import (
     KEY,
     KNOWN,
     MET,
+    MET_AT,
     PAIR,
     SLICE,
     START,
-    WHEN,
 )
 from vdsm_pin.proof.motions import Motion, interpolate
 from vdsm_pin.proof.packed_tree import place_two
@@ -183,7 +183,7 @@ def examine(slicing: Slicing, row: FloatArray, t: float, witness: Witness) -> No
     exact = _bound_towards(slicing, instant, aim)
     upper = space.out[UPPER] + task.pairs.rise[pair]
     if upper < witness.value[MET]:
-        witness.value[MET], witness.value[WHEN] = upper, t
+        witness.value[MET], witness.value[MET_AT] = upper, t
         for c in range(NEAR, BRACKET):
             witness.points[c - NEAR] = space.out[c]
         own, mover = witness.points[:3], mover_of(task, pair)

@@ -18,6 +18,7 @@ from vdsm_pin.proof.layouts import (
     KNOWN,
     LOW,
     MET,
+    MET_AT,
     OWN,
     PAIR,
     SLICE,
@@ -25,7 +26,6 @@ from vdsm_pin.proof.layouts import (
     SUPPORT,
     TIME,
     UP,
-    WHEN,
 )
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.proving import Proving, dense_rows
@@ -135,7 +135,7 @@ def _judge_slices(
                 least[LOW], least[AT_LOWER] = row[KEY], slices[k, 0]
             if witness.value[MET] < least[UP]:
                 least[UP], least[AT_UPPER] = witness.value[MET], slices[k, 0]
-                least[TIME], least[OWN:] = witness.value[WHEN], witness.points
+                least[TIME], least[OWN:] = witness.value[MET_AT], witness.points
         # The support that is remembered is of another direction.
         plane[SUPPORT] = plane[HELD_CLEARANCE] = -np.inf
         place_witness(task, motion, work.ends, pair, least)

@@ -7,7 +7,7 @@ import numpy as np
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, paged_zeros, uncleared
 from vdsm_pin.geometry.bodies import RADIUS
-from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
+from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, SLICE, SUPPORT, VERSION
 from vdsm_pin.proof.packed_tree import REVOLUTE, Pose
 from vdsm_pin.proof.plane_bounds import Runs, new_runs
 from vdsm_pin.proof.rows import BLOCK, DRIFT, TURN, Rows, new_rows, new_tracks
@@ -43,7 +43,7 @@ def forget(planes: FloatArray) -> None:
     """No pair remembers a plane any more, one row each."""
     planes[:] = 0.0
     for pair in range(planes.shape[0]):
-        planes[pair, ROW] = pair
+        planes[pair, VERSION] = pair
     planes[:, SUPPORT] = planes[:, HELD_CLEARANCE] = -np.inf
 
 
