@@ -257,10 +257,13 @@ def test_results_show_themselves_in_a_few_lines() -> None:
 @pytest.mark.parametrize(
     ("scene", "strategy", "depth_mm"),
     [
-        ("obs1", "paper", -61.5),
-        ("obs2", "paper", -40.2),
-        ("obs2-small", "paper", -28.4),
-        ("obs3", "paper", -27.7),
+        ("obs1", "paper", -61.4),
+        ("obs1", "fewest", -45.0),
+        ("obs2", "paper", -40.1),
+        ("obs2", "fewest", -6.4),
+        ("obs2-small", "paper", -28.3),
+        ("obs2-small", "fewest", -13.4),
+        ("obs3", "paper", -27.6),
         ("obs3", "fewest", -12.2),
     ],
 )
@@ -273,7 +276,7 @@ def test_the_papers_joint_error_touches(
     result = vp.verify(problem, plan.trajectory, errors=vp.ErrorBox(joint_deg=0.3))
     assert result.verdict is vp.Verdict.REFUTED
     worst = min(found.clearance for found in result.counterexamples)
-    assert 1e3 * worst == pytest.approx(depth_mm, abs=0.1)
+    assert depth_mm - 0.1 < 1e3 * worst <= depth_mm  # at least so deep
 
 
 def test_a_certificate_states_a_turn_of_the_base(tmp_path: Path) -> None:
