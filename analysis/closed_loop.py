@@ -1,38 +1,27 @@
-"""Section 7 in simulation: plans run by elastic cables and motors, Fig. 19 to 21.
+"""Section 7 in simulation: plans run by elastic cables and motors.
 
     python analysis/closed_loop.py --out reports/paper
 
-Every plan runs once as it is and, for the figures of obs3, once with a kick at alpha5
-and alpha6. What is assumed stands in `vdsm_pin/simulation/settings.py`; nothing was
-fitted.
+What is assumed stands in `vdsm_pin/simulation/settings.py`; nothing was fitted.
+`closed_loop_figures.py` draws Fig. 19 to 21.
 """
 
 import math
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from closed_loop_figures import actual_and_planned, errors, poses
-from paper_figures import style
+from closed_loop_figures import FIGURES
 from result_files import output_folder, table_lines, write_table
 
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.simulation.closed_loop import Simulation, simulate
+from vdsm_pin.simulation.closed_loop import simulate
 from vdsm_pin.simulation.folder import Cleared, SimulationFile, summary
-from vdsm_pin.simulation.settings import Kick, Settings
+from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.units import percent, proved_mm, quantity
 
 SCENES = ("free", "obs1", "obs2", "obs2-small", "obs3")
 STRATEGIES = ("paper", "fewest", "sturdiest")
-KICKS = (
-    Kick(axis="alpha", joint=5, share=0.35, torque_nm=6.0),
-    Kick(axis="alpha", joint=6, share=0.65, torque_nm=12.0),
-)
-"""Disturbances of the size that the paper's Fig. 21 shows: about 4 deg."""
-
 
 SWEEPS = (
     ("mass of the links [kg/m]", "bodies", "mass_per_length_kg_m", (2.0, 4.0, 8.0)),
@@ -47,32 +36,21 @@ SWEEPS = (
 """Assumptions that are varied one at a time, on obs3 by the paper's rule."""
 
 
-@dataclass(frozen=True)
-class Ran:
-    """One plan and what came of it."""
-
-    problem: PlanningProblem
-    trajectory: Trajectory
-    simulation: Simulation
-    file: SimulationFile
-
-
 @cache
-def _ran(scene: str, strategy: str, settings: str) -> Ran:
+def _ran(scene: str, strategy: str, settings: str) -> SimulationFile:
     return _run(scene, strategy, Settings.model_validate_json(settings))
 
 
-def run(scene: str, strategy: str, settings: Settings) -> Ran:
+def run(scene: str, strategy: str, settings: Settings) -> SimulationFile:
     """Plan, simulate, prove; once, however often the same is asked for."""
     return _ran(scene, strategy, settings.model_dump_json())
 
 
-def _run(scene: str, strategy: str, settings: Settings) -> Ran:
+def _run(scene: str, strategy: str, settings: Settings) -> SimulationFile:
     problem = read_problem(f"paper/{scene}")
     trajectory = plan_and_verify(problem, strategy).plan.trajectory
     found = simulate(problem.manipulator, trajectory, settings)
-    file = summary(problem, trajectory, found, settings, "")
-    return Ran(problem, trajectory, found, file)
+    return summary(problem, trajectory, found, settings, "")
 
 
 def row(scene: str, strategy: str, file: SimulationFile) -> dict[str, str]:
@@ -98,7 +76,7 @@ def sweep() -> list[dict[str, str]]:
         for value in values:
             before = getattr(Settings(), part)
             changed = before.model_copy(update={key: value})
-            file = run("obs3", "paper", Settings(**{part: changed})).file
+            file = run("obs3", "paper", Settings(**{part: changed}))
             found = row("obs3", "paper", file)
             kept = [*list(found)[3:6], *list(found)[7:]]
             said = f"{value:g}" if isinstance(value, float) else str(value)
@@ -130,33 +108,20 @@ def markdown(rows: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
     lines += [*planned, "", "## What the assumptions do", "",
               "obs3 by the paper's rule, one assumption changed at a time.", "",
               *changed]  # fmt: skip
-    for name in ("fig19", "fig20-paper", "fig20-fewest", "fig21-paper", "fig21-fewest"):
+    for name in FIGURES:
         lines += ["", f'<img src="{name}.png" width="800" alt="{name}">']
     return "\n".join(lines) + "\n"
 
 
 def main(folder: Path) -> None:
-    """Run everything, write tables and figures."""
+    """Run everything, write the tables."""
     rows = []
     for scene in SCENES:
         for strategy in STRATEGIES:
-            ran = run(scene, strategy, Settings())
-            rows.append(row(scene, strategy, ran.file))
+            rows.append(row(scene, strategy, run(scene, strategy, Settings())))
             print(rows[-1], flush=True)
     swept = sweep()
     write_table(folder, "closed_loop", [*rows, *swept], markdown(rows, swept))
-    for strategy in ("paper", "fewest"):
-        ran = run("obs3", strategy, Settings(kicks=KICKS))
-        figures = {
-            f"fig20-{strategy}": actual_and_planned(ran.simulation),
-            f"fig21-{strategy}": errors(ran.simulation),
-        }
-        if strategy == "paper":
-            figures["fig19"] = poses(ran.problem, ran.simulation)
-        style.save_all(figures, folder)
-        for name in figures:
-            if name != "fig19":  # twenty thousand points a curve: a picture is smaller
-                (folder / f"{name}.svg").unlink()
 
 
 if __name__ == "__main__":

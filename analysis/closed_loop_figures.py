@@ -4,18 +4,41 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from paper_figures import style
+from paper_figures.runs import STRATEGIES, Runs
 from paper_figures.scenery import draw_arm, draw_obstacles, faces
 from paper_figures.views import oblique
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.palette import AXES, PATH
-from vdsm_pin.simulation.closed_loop import Simulation
+from vdsm_pin.simulation.closed_loop import Simulation, simulate
 from vdsm_pin.simulation.folder import BAND
+from vdsm_pin.simulation.settings import Kick, Settings
 
 VIEW = oblique(35.0, 22.0)
 MOMENTS = 6
 """Poses of Fig. 19."""
+FIGURES = tuple(f"fig{k}-{name}" for k in (19, 20, 21) for name in STRATEGIES)
+KICKS = (
+    Kick(axis="alpha", joint=5, share=0.35, torque_nm=6.0),
+    Kick(axis="alpha", joint=6, share=0.65, torque_nm=12.0),
+)
+"""Disturbances of the size that the paper's Fig. 21 shows: about 4 deg."""
+
+
+def draw(runs: Runs) -> dict[str, Figure]:
+    """The three figures of obs3 with both kicks, for each strategy."""
+    figures = {}
+    for strategy in STRATEGIES:
+        run = runs("obs3", strategy)
+        arm = run.problem.manipulator
+        found = simulate(arm, run.trajectory, Settings(kicks=KICKS))
+        figures |= {
+            f"fig19-{strategy}": poses(run.problem, found),
+            f"fig20-{strategy}": actual_and_planned(found),
+            f"fig21-{strategy}": errors(found),
+        }
+    return figures
 
 
 def poses(problem: PlanningProblem, found: Simulation) -> Figure:

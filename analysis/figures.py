@@ -28,7 +28,10 @@ SCRIPTS: Final = (
     "fig16_ranges",
     "fig17_clearance",
     "fig18_cables",
+    "closed_loop_figures",
 )
+WITHOUT_SVG: Final = ("fig20", "fig21")
+"""Twenty thousand points a curve: a picture is smaller."""
 
 
 def main(runs: Runs | None = None) -> None:
@@ -36,7 +39,11 @@ def main(runs: Runs | None = None) -> None:
     folder, runs = output_folder(__doc__), runs or Runs()
     for script in SCRIPTS:
         begin = time.perf_counter()
-        style.save_all(importlib.import_module(script).draw(runs), folder)
+        figures = importlib.import_module(script).draw(runs)
+        style.save_all(figures, folder)
+        for name in figures:
+            if name.startswith(WITHOUT_SVG):
+                (folder / f"{name}.svg").unlink()
         print(f"{script}: {time.perf_counter() - begin:.1f} s", flush=True)
     found = numbers.numbers(runs)
     numbers.write(found, folder / "numbers.json")
