@@ -54,6 +54,12 @@ class Tolerances:
     changed_angle: float = _held(8.726646259971648e-4, "rad")
     """A link angle above this counts as changed: 0.05 deg; [rad]."""
 
+    widest_region: float = _held(5e-5, "m")
+    """To what the widest danger region that draws as much is told; [m].
+
+    Some fifteen plans of about 0.1 s each tell it so far.
+    """
+
     row_change: float = _held(8.726646259971648e-2, "rad")
     """Largest change of a joint angle from row to row of a plan: 5 deg; [rad]."""
 

@@ -62,18 +62,19 @@ def quantity(value: float | None, unit: str, whole: Whole | None = None) -> str:
     return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
 
 
-def measured(value: float | None, unit: str, whole: Whole | None = None) -> str:
+def measured(value: float | None, unit: str) -> str:
     """The same of a length or an angle of the motion, where rounding noise is zero."""
     if value is None or isnan(value):
         return MISSING
     factor, _ = _DISPLAY_UNITS.get(unit, (1.0, ""))
-    shown = value if abs(value) * factor >= _SMALLEST_FIXED else 0.0
-    return quantity(shown, unit, whole)
+    return quantity(value if abs(value) * factor >= _SMALLEST_FIXED else 0.0, unit)
 
 
 def measured_at_most(value: float, unit: str) -> str:
-    """The same rounded up: an error is not told to be smaller than it was."""
-    return measured(value, unit, ceil)
+    """The same rounded up, to 0.001 mm or 0.001 deg: not told smaller than it was."""
+    factor, _ = _DISPLAY_UNITS[unit]
+    least = _SMALLEST_FIXED / factor if value > 0.0 else 0.0
+    return quantity(max(value, least), unit, ceil)
 
 
 def percent(share: float | None) -> str:

@@ -1,12 +1,12 @@
 """The numbers that the page of figures quotes, from certified plans."""
 
 import json
-import math
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import paper_table
+from result_files import at_least
 
 from paper_figures.distances import AXES, axis_distance
 from paper_figures.marks import marks
@@ -96,8 +96,8 @@ def read(file: Path) -> dict[str, Any]:
 
 
 def _rounded_down(value: float) -> float:
-    """To 1 um: the last bits of a proved bound are those of the search for it."""
-    return math.floor(value * 1e3) / 1e3
+    """To 0.001: the last bits of a proved bound are those of the search for it."""
+    return float(at_least(value, 3))
 
 
 def _round(value: float) -> float:

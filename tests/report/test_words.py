@@ -15,7 +15,13 @@ from vdsm_pin.report.words import (
     place,
     survived,
 )
-from vdsm_pin.units import MISSING, percent, percent_at_most, quantity
+from vdsm_pin.units import (
+    MISSING,
+    measured_at_most,
+    percent,
+    percent_at_most,
+    quantity,
+)
 
 
 @pytest.mark.parametrize(
@@ -115,3 +121,8 @@ def test_what_is_proved_is_never_rounded_up() -> None:
     assert at_least(5e-3) == at_most(5e-3) == quantity(5e-3, "m") == "5.000 mm"
     assert at_least(0.10600089937594809) == "106.000 mm"
     assert at_least(1.23456) == "1234.5 mm"
+
+
+def test_no_error_is_told_smaller_than_it_was() -> None:
+    told = [measured_at_most(value, "m") for value in (0.0, 1e-12, 9e-7, 0.00123401)]
+    assert told == ["0.000 mm", "0.001 mm", "0.001 mm", "1.235 mm"]

@@ -42,7 +42,7 @@ def widest(
         low: A reserve it has.
         high: A reserve that nothing has.
         rounds: Most halvings.
-        until: Width of what is left at which to stop.
+        until: Width of what is left at which to stop, in the unit of the reserves.
 
     Returns:
         The plans, the first one included, and the reserve of the last.

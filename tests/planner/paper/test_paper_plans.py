@@ -21,7 +21,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism, Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.largest_margin import drawn_length
-from vdsm_pin.planner.paper.clearest import RESOLUTION, plan_paper_clearest
+from vdsm_pin.planner.paper.clearest import plan_paper_clearest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.desired_path import Approach, Blocked
@@ -151,10 +151,12 @@ def test_the_widest_region_counts_from_the_margin_that_is_asked_for() -> None:
         kept.append(float(clearance(plan.centres).min()))
         (found,) = re.findall(r"keep more than ([\d.]+) mm", plan.notes[-1])
         assert 1e-3 * float(found) <= kept[-1]
-        more = 1e-3 * float(found) - problem.required_clearance + RESOLUTION
+        more = (
+            1e-3 * float(found) - problem.required_clearance + TOLERANCES.widest_region
+        )
         wider = plan_paper(problem, clearance, more + 1e-6)  # the message is rounded
         assert drawn_length(wider) < drawn_length(plan) - 1e-6
-    assert kept[0] == pytest.approx(kept[1], abs=RESOLUTION)
+    assert kept[0] == pytest.approx(kept[1], abs=TOLERANCES.widest_region)
 
 
 def test_without_a_wider_region_the_plan_is_that_of_the_rule() -> None:

@@ -12,9 +12,8 @@ from vdsm_pin.planner.largest_margin import told, widest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 
-RESOLUTION: Final = 5e-5
-"""To what the reserve is told; [m]."""
 ROUNDS: Final = 20
 """Most halvings: as many as 50 m need."""
 
@@ -38,7 +37,7 @@ def plan_paper_clearest(
         max(low, 0.0),
         high,
         rounds=ROUNDS,
-        until=RESOLUTION,
+        until=TOLERANCES.widest_region,
     )
     notes = (*plans[-1].notes, told(kept + reserve))
     return replace(plans[-1], strategy=name, notes=notes)

@@ -1,0 +1,52 @@
+"""Each committed page of tables is what its script makes of the committed numbers."""
+
+import importlib
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("matplotlib")
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "analysis"))
+
+Rows = list[dict[str, Any]]
+
+
+def closed_loop(script: Any, rows: Rows) -> str:
+    swept = [row for row in rows if "assumption" in row]
+    return str(script.markdown([row for row in rows if row not in swept], swept))
+
+
+def step5_choices(script: Any, rows: Rows) -> str:
+    literals = [script.Literal(**row) for row in rows if "line" not in row]
+    singles = [script.OneLine(**row) for row in rows if "line" in row]
+    return str(script.markdown(literals, singles))
+
+
+def plain(name: str) -> Callable[[Any, Rows], str]:
+    def made(script: Any, rows: Rows) -> str:
+        return str(script.markdown([getattr(script, name)(**row) for row in rows]))
+
+    return made
+
+
+PAGES = {
+    "closed_loop": ("closed_loop", closed_loop),
+    "moving_obstacle": ("moving_obstacle", plain("Line")),
+    "obs2_orientations": ("obs2_orientations", plain("Row")),
+    "step5_choices": ("step5_choices", step5_choices),
+    "table": ("paper_table", plain("Row")),
+}
+"""The script of each page, and how it makes the page of the rows."""
+
+
+@pytest.mark.parametrize("page", sorted(PAGES))
+def test_a_page_is_what_its_script_makes_of_its_numbers(page: str) -> None:
+    name, made = PAGES[page]
+    file = ROOT / "reports/paper" / f"{page}.json"
+    text = made(importlib.import_module(name), json.loads(file.read_text("utf-8")))
+    assert file.with_suffix(".md").read_text("utf-8") == text
