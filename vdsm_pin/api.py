@@ -182,7 +182,7 @@ def repair_trajectory(
     pinned: Sequence[int] = (),
     *,
     time_limit: float | None = None,
-) -> "Repaired[ArmVerification]": ...
+) -> "Repaired[Trajectory, ArmVerification]": ...
 
 
 @overload
@@ -192,7 +192,7 @@ def repair_trajectory(
     pinned: Sequence[int] = (),
     *,
     time_limit: float | None = None,
-) -> "Repaired[RobotVerification]": ...
+) -> "Repaired[JointTrajectory, RobotVerification]": ...
 
 
 def repair_trajectory(
@@ -201,7 +201,7 @@ def repair_trajectory(
     pinned: Sequence[int] = (),
     *,
     time_limit: float | None = None,
-) -> "Repaired[Any]":
+) -> "Repaired[Any, Any]":
     """A certified trajectory near one that is not.
 
     Args:
@@ -211,7 +211,7 @@ def repair_trajectory(
         time_limit: When to give up; None for never; [s].
 
     Returns:
-        `verification`, certified, whose `trajectory` (of a robot: `motion`) was found;
+        `trajectory`, the motion that was found; `verification` of it, certified;
         `given`, the number of the row that each of its rows was, -1 for a new one;
         `moved`, how far each was moved, shape (n_rows,); [rad], [m].
 

@@ -108,9 +108,9 @@ def test_smooth_motion_is_repaired_as_a_smooth_one(tmp_path: Path, degree: int) 
     given = rows_of(OVER, **more)
     assert verify_robot(this, given.path).verdict == "refuted"
     found = repair_robot(this, given)
-    motion = found.verification.motion
+    motion = found.trajectory
     assert found.verification.verdict == "certified"
-    assert motion is not None
+    assert found.verification.motion is motion
     assert motion.rates is not None
     assert motion.path.degree == degree
     assert motion.path.same_as(found.verification.trajectory)

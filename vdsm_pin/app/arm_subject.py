@@ -112,15 +112,11 @@ class ArmSubject:
 
     def repair(
         self, motion: Trajectory, pinned: Sequence[int]
-    ) -> "Repaired[ArmVerification]":
+    ) -> "Repaired[Trajectory, ArmVerification]":
         """Find a certified motion near a given one."""
         from vdsm_pin.repair.arm import repair_arm
 
         return repair_arm(self.problem, motion, pinned, self.options.deadline)
-
-    def motion_of(self, verification: ArmVerification) -> Trajectory:
-        """The motion that was judged."""
-        return verification.trajectory
 
     def write(self, file: Path, motion: Trajectory) -> None:
         """Write a motion as CSV."""

@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from vdsm_pin import __version__
 from vdsm_pin.app.motions import MotionOptions
@@ -28,7 +28,7 @@ REPAIR: Final = "repair.json"
 class RepairedFiles(NamedTuple):
     """A repair, and what verification.json says of its trajectory as written."""
 
-    found: Repaired[Verification]
+    found: Repaired[Any, Verification]
     file: VerificationFile
 
 
@@ -66,7 +66,7 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Repair
     }
     earlier = naming_earlier(order.folder / VERIFICATION)
     with earlier, staged(order.folder) as staging:
-        subject.write(staging / TRAJECTORY, subject.motion_of(found.verification))
+        subject.write(staging / TRAJECTORY, found.trajectory)
         (staging / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
         options = MotionOptions(deadline=order.options.deadline)
         again = replace(order, trajectory=staging / TRAJECTORY, options=options)

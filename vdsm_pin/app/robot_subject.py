@@ -96,16 +96,11 @@ class RobotSubject:
 
     def repair(
         self, motion: JointTrajectory, pinned: Sequence[int]
-    ) -> "Repaired[RobotVerification]":
+    ) -> "Repaired[JointTrajectory, RobotVerification]":
         """Find a certified motion near a given one."""
         from vdsm_pin.repair.robot import repair_robot
 
         return repair_robot(self.problem, motion, pinned, self.options.deadline)
-
-    def motion_of(self, verification: RobotVerification) -> JointTrajectory:
-        """The motion that was judged."""
-        assert verification.motion is not None  # of `judge` or `repair`
-        return verification.motion
 
     def write(self, file: Path, motion: JointTrajectory) -> None:
         """Write a motion as CSV."""

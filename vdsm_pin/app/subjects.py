@@ -97,7 +97,7 @@ class Subject(Protocol):
             VerificationFailed: If there is no proof to write, or one that is too large.
         """
 
-    def repair(self, motion: Any, pinned: Sequence[int]) -> "Repaired[Any]":
+    def repair(self, motion: Any, pinned: Sequence[int]) -> "Repaired[Any, Any]":
         """Find a certified motion near a given one.
 
         Args:
@@ -107,9 +107,6 @@ class Subject(Protocol):
         Raises:
             Infeasible: If none was found.
         """
-
-    def motion_of(self, verification: Any) -> Any:
-        """The motion that was judged."""
 
     def write(self, file: Path, motion: Any) -> None:
         """Write a motion as CSV, with digits that read back as the same doubles."""

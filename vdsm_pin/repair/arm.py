@@ -129,7 +129,7 @@ def repair_arm(
     trajectory: Trajectory,
     pinned: Sequence[int] = (),
     deadline: Deadline = NO_LIMIT,
-) -> Repaired[ArmVerification]:
+) -> Repaired[Trajectory, ArmVerification]:
     """A certified motion near a given one.
 
     The first row stays, the last one where it does not draw a path or pieces are

@@ -99,7 +99,7 @@ def repair_robot(
     motion: JointTrajectory,
     pinned: Sequence[int] = (),
     deadline: Deadline = NO_LIMIT,
-) -> Repaired[RobotVerification]:
+) -> Repaired[JointTrajectory, RobotVerification]:
     """A certified motion near a given one; start, goal and pinned waypoints stay.
 
     Args:

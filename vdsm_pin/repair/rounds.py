@@ -8,19 +8,22 @@ How rows are pushed is told by who knows the robot.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isnan
-from typing import Final, Generic, Protocol, Self, TypeVar
+from typing import Any, Final, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
 from vdsm_pin.errors import Infeasible, InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.notebook import Summarised
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import MM_PER_M, in_mm
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.records import Verdict, Verification
 
+R = TypeVar("R", bound=Trajectory | JointTrajectory)
 V = TypeVar("V", bound=Verification)
 
 ROUNDS: Final = 12
@@ -37,10 +40,11 @@ MOST: Final = 300
 
 
 @dataclass(frozen=True, repr=False)
-class Repaired(Summarised, Generic[V]):
+class Repaired(Summarised, Generic[R, V]):
     """A motion that is certified, and how far it is from the one that was given.
 
     Args:
+        trajectory: The motion, of the kind that was given.
         verification: Of the motion.
         given: Number of the given waypoint that each waypoint was, -1 for a new one,
             shape (n_rows,).
@@ -48,6 +52,7 @@ class Repaired(Summarised, Generic[V]):
             joint that differs most, shape (n_rows,); [rad], [m].
     """
 
+    trajectory: R
     verification: V
     given: IntArray
     moved: FloatArray
@@ -215,6 +220,11 @@ class Pushed(Protocol):
     """A motion on its way to be certified."""
 
     @property
+    def rows(self) -> Trajectory | JointTrajectory:
+        """The motion now."""
+        ...
+
+    @property
     def q(self) -> FloatArray:
         """Its joint values, shape (n_rows, n_columns)."""
         ...
@@ -242,7 +252,7 @@ def repaired(
     margins: tuple[float, float],
     deadline: Deadline,
     under_errors: bool,
-) -> Repaired[V]:
+) -> Repaired[Any, V]:
     """A certified motion near a given one.
 
     Args:
@@ -279,7 +289,7 @@ def repaired(
         deadline.check()  # else what was not judged in time would be the reason
         raise Infeasible(_why(found))
     moved = np.abs(motion.q - motion.origins.base).max(axis=1, initial=0.0)
-    return Repaired(found, motion.origins.given, moved)
+    return Repaired(motion.rows, found, motion.origins.given, moved)
 
 
 def _lost(least: LeastClearances, pair: int) -> float:
