@@ -158,10 +158,7 @@ def explore(
     yield best
     if best.proof.undrawable.all():
         return
-    # The way out of a start that is bent more than is liked must be allowed.
-    bent = largest_start_angle(problem) + TOLERANCES.joint_limit
-    least_ease = min(1.0, bent / link_limit(problem))
-    kept = link_margins(problem.manipulator, weights.joint_error)
+    judges = _Judges(problem, clearance, margin, weights)
     no_way_out: NoWayOut | None = None
     stuck: Stuck | None = None
     spaces = _Spaces(problem, clearance, margin)
@@ -171,22 +168,14 @@ def explore(
         if best.found is None and room.confined:
             levels = confined_first(levels)
         level, levels = levels[0], levels[1:]
-        ease = max(level.ease, least_ease)
-        worth = problem.required_clearance + margin
-        worth += (level.slack + weights.clearance) * length
-        worth += 0.0 if kept is None else float(kept[-1])
-        judge = Judge(
-            problem, clearance, margin, level.slack * length, level.finest * length,
-            ease, clearance.up_to(worth), kept,
-        )  # fmt: skip
-        now = Explored(judge, None, rows, proof, stuck)
+        now = Explored(judges.of(level), None, rows, proof, stuck)
         try:
             if isinstance(level, Insert):
                 now = _inserted(now, spaces.of(level), level, soon)
                 stuck = now.stuck
             elif isinstance(level, Search):
-                found, room = _look(judge, level, rows, proof, weights)
-                now = Explored(judge, found, rows, proof, stuck)
+                found, room = _look(now.judge, level, rows, proof, weights)
+                now = replace(now, found=found)
         except NoWayOut as error:
             no_way_out = error
         except OutOfTime:
@@ -241,6 +230,48 @@ class Room(NamedTuple):
     def one_knee_draws(self) -> bool:
         """Whether arms with one knee stand along most of the path."""
         return self.on_path >= ONE_KNEE_DRAWS
+
+
+class _Judges:
+    """Judges of levels.
+
+    Args:
+        problem: What is asked.
+        clearance: The clearance function.
+        margin: Kept beyond the required clearance; [m].
+        weights: What the strategy prefers.
+    """
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        clearance: BroadPhase,
+        margin: float,
+        weights: CostWeights,
+    ) -> None:
+        self.problem, self.clearance, self.margin = problem, clearance, margin
+        self.link_margins = link_margins(problem.manipulator, weights.joint_error)
+        self.reserve = weights.clearance
+        # The way out of a start that is bent more than is liked must be allowed.
+        bent = largest_start_angle(problem) + TOLERANCES.joint_limit
+        self.least_ease = min(1.0, bent / link_limit(problem))
+
+    def of(self, level: Level) -> Judge:
+        """That of one level."""
+        length, margins = self.problem.manipulator.total_length, self.link_margins
+        worth = self.problem.required_clearance + self.margin
+        worth += (level.slack + self.reserve) * length
+        worth += 0.0 if margins is None else float(margins[-1])
+        return Judge(
+            self.problem,
+            self.clearance,
+            self.margin,
+            level.slack * length,
+            level.finest * length,
+            max(level.ease, self.least_ease),
+            rough=self.clearance.up_to(worth),
+            kept=margins,
+        )
 
 
 class _Spaces:
