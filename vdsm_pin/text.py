@@ -8,12 +8,16 @@ message passes through here first.
 import math
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 LONGEST: Final = 4_000
 """Characters of one message; what a file holds may be longer."""
 
+
+NAMED: Final = 8
+"""Names of a phrase that lists them; of more it says how many."""
 
 UNSEEN: Final = (
     r"\x00-\x1f\x7f-\x9f\xad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff"
@@ -35,6 +39,13 @@ def printable(text: str) -> str:
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
     )
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in one phrase, the first few of many."""
+    more = len(names) - NAMED
+    shown = ", ".join(repr(name[:40]) for name in names[:NAMED])
+    return f"{shown} and {more} more" if more > 0 else shown
 
 
 def plain_number(text: str) -> float:

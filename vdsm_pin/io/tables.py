@@ -23,6 +23,7 @@ import pydantic_core
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.trajectory import MAX_ROWS
+from vdsm_pin.text import listed
 
 CHUNK_ROWS: Final = 5_000
 """Rows held as text at one time."""
@@ -39,7 +40,6 @@ _CUT: Final = re.compile(r"\d\.?[eE][-+]?\d\Z", re.ASCII)
 """A last number with one digit of an exponent, which most programs write with two."""
 
 _BLANK: Final = ' \t\n;,"'
-_NAMES_SHOWN: Final = 8
 
 
 @dataclass(frozen=True)
@@ -255,13 +255,6 @@ class Table:
             problem = f"{name} is {word.strip()[:40]}, expected a finite number"
             raise row.invalid(problem)
         return value
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names in one phrase, the first few of many."""
-    more = len(names) - _NAMES_SHOWN
-    shown = ", ".join(repr(name[:40]) for name in names[:_NAMES_SHOWN])
-    return f"{shown} and {more} more" if more > 0 else shown
 
 
 def quoted(text: str) -> str:

@@ -6,11 +6,11 @@ from dataclasses import asdict
 from typing import Final
 
 from vdsm_pin.arm.bodies import MEET
-from vdsm_pin.io.tables import listed
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.rows import LeftOutRow
 from vdsm_pin.report.words import at_least, check_cells, finite, place, rounding
+from vdsm_pin.text import listed
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import percent, quantity
 from vdsm_pin.verification.inside import surfaces

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.words import TIME_LIMIT, outcome
+from vdsm_pin.text import printable
 
 
 @contextmanager
@@ -101,16 +102,11 @@ def junit_text(rows: Sequence[BatchRow]) -> str:
             {"classname": f"vdsm.{row.strategy}", "name": row.folder, "time": "0"},
         )
         if row in broken:
-            mark = {"message": _printable(row.reason), "type": row.outcome}
+            mark = {"message": printable(row.reason), "type": row.outcome}
             ElementTree.SubElement(case, "error", mark)
         elif row not in passed:
-            mark = {"message": _printable(row.reason), "type": row.outcome}
+            mark = {"message": printable(row.reason), "type": row.outcome}
             ElementTree.SubElement(case, "failure", mark)
     ElementTree.indent(root)
     head = '<?xml version="1.0" encoding="UTF-8"?>\n'
     return head + ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
-def _printable(text: str) -> str:
-    """Without the control characters that XML forbids."""
-    return "".join(sign if sign.isprintable() else " " for sign in text)

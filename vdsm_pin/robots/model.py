@@ -10,12 +10,12 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
-from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body, LeftOut
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import HULLS, MeshCover
 from vdsm_pin.robots.srdf import Base
+from vdsm_pin.text import listed
 
 Values: TypeAlias = Mapping[str, tuple[int | None, float, float]]
 """Of a joint by name: column of q, None where it stands still, ratio and offset."""

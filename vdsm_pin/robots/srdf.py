@@ -9,8 +9,8 @@ from typing import Final, Literal, TypeAlias, cast
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.source import read_text
-from vdsm_pin.io.tables import listed
 from vdsm_pin.io.xml_reader import end, read_xml
+from vdsm_pin.text import listed
 
 MAX_BYTES: Final = 16 << 20
 

@@ -11,11 +11,11 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.bags import is_bag, read_bag
 from vdsm_pin.io.source import check_is_file
-from vdsm_pin.io.tables import listed
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.robots.model import RobotJoint, Values
 from vdsm_pin.robots.trajectory_csv import read_csv
+from vdsm_pin.text import listed
 from vdsm_pin.tolerances import TOLERANCES
 
 if TYPE_CHECKING:  # whoever reads waypoints alone needs no pieces

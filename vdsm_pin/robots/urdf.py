@@ -8,7 +8,6 @@ import numpy as np
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.source import naming_file
-from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body, LeftOut
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import RobotFiles
@@ -18,6 +17,7 @@ from vdsm_pin.robots.link_solids import LinkReader
 from vdsm_pin.robots.model import Robot, reach_of
 from vdsm_pin.robots.srdf import Srdf
 from vdsm_pin.robots.xacro import urdf_text
+from vdsm_pin.text import listed
 
 
 def read_robot(files: RobotFiles) -> Robot:
