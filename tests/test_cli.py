@@ -731,12 +731,14 @@ def test_each_problem_of_a_batch_has_the_time_of_a_plan(
     with monkeypatch.context() as changed:
         changed.setattr("vdsm_pin.batch.run.run_batch", note)
         for cold in (False, True):
-            changed.setattr("vdsm_pin.kept.is_cold", lambda cold=cold: bool(cold))
+            changed.setattr(
+                "vdsm_pin.app.first_plan.is_cold", lambda cold=cold: bool(cold)
+            )
             for more in ((), ("--scheduler", "tcp://x:1"), ("--time-limit", "inf")):
                 vdsm(*words, *more)
     assert asked == [60.0, 600.0, math.inf, 600.0, 600.0, math.inf]
-    monkeypatch.setattr("vdsm_pin.kept.LIMIT", 0.001)
-    monkeypatch.setattr("vdsm_pin.kept.is_cold", lambda: False)
+    monkeypatch.setattr("vdsm_pin.app.first_plan.LIMIT", 0.001)
+    monkeypatch.setattr("vdsm_pin.app.first_plan.is_cold", lambda: False)
     ran = vdsm(*words, "--json")
     (row,) = json.loads(ran.out)
     assert (ran.status, row["outcome"]) == (1, "time-limit")

@@ -173,8 +173,8 @@ def test_only_the_default_of_a_cold_machine_counts_as_a_first_plan(
         raise OutOfTime(limits[-1], "searched")
 
     monkeypatch.setattr("vdsm_pin.app.workflow.plan_to_folder", slow)
-    monkeypatch.setattr("vdsm_pin.kept.is_cold", lambda: cold)
-    monkeypatch.setattr("vdsm_pin.kept.note_planned", lambda: noted.append(1))
+    monkeypatch.setattr("vdsm_pin.app.first_plan.is_cold", lambda: cold)
+    monkeypatch.setattr("vdsm_pin.app.first_plan.note_planned", lambda: noted.append(1))
     words = [] if asked is None else ["--time-limit", asked]
     out = ["--out", str(tmp_path / "out")]
     CliRunner().invoke(app, ["plan", "paper/free", *out, *words])

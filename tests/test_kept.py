@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdsm_pin import kept
+from vdsm_pin.app import first_plan
 
 PROGRAM = """
 import sys
@@ -183,13 +184,13 @@ def test_it_is_cold_until_a_plan_was_made_to_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(kept, "folders", lambda: iter([tmp_path / "a", tmp_path / "b"]))
-    assert kept.is_cold()
+    assert first_plan.is_cold()
     kept.keep("vdsm_pin.planner.some", b"machine code")
-    assert kept.is_cold(), "one small run compiles little"
-    assert kept.default_limit() == 600.0
-    kept.note_planned()
-    assert not kept.is_cold()
-    assert kept.default_limit() == 60.0
+    assert first_plan.is_cold(), "one small run compiles little"
+    assert first_plan.default_limit() == 600.0
+    first_plan.note_planned()
+    assert not first_plan.is_cold()
+    assert first_plan.default_limit() == 60.0
 
 
 def test_other_versions_are_cold_again(
@@ -198,15 +199,14 @@ def test_other_versions_are_cold_again(
     """What was compiled before an upgrade is of no use after it."""
     monkeypatch.setattr(kept, "folders", lambda: iter([tmp_path / "kept"]))
     (tmp_path / "package" / "proof").mkdir(parents=True)
-    monkeypatch.setattr(kept, "__file__", str(tmp_path / "package" / "kept.py"))
+    monkeypatch.setattr(first_plan, "__file__", str(tmp_path / "package/app/plan.py"))
     source = tmp_path / "package" / "proof" / "tree.py"
-    for file in (tmp_path / "package" / "kept.py", source):
-        file.write_text("one = 1\n")
-    kept.note_planned()
-    assert not kept.is_cold()
+    source.write_text("one = 1\n")
+    first_plan.note_planned()
+    assert not first_plan.is_cold()
     source.write_text("one = 10\n")
-    assert kept.is_cold()
-    kept.note_planned()
-    assert not kept.is_cold()
-    monkeypatch.setattr(kept, "version", lambda name: "another")
-    assert kept.is_cold()
+    assert first_plan.is_cold()
+    first_plan.note_planned()
+    assert not first_plan.is_cold()
+    monkeypatch.setattr(first_plan, "version", lambda name: "another")
+    assert first_plan.is_cold()

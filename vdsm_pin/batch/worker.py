@@ -4,6 +4,7 @@ import shutil
 import time
 from pathlib import Path
 
+from vdsm_pin.app.first_plan import note_planned
 from vdsm_pin.app.motions import MotionOptions
 from vdsm_pin.app.problems import read_problem
 from vdsm_pin.app.subjects import ProblemOrCell, read_problem_or_cell
@@ -33,7 +34,6 @@ from vdsm_pin.errors import (
     VerificationFailed,
 )
 from vdsm_pin.io.atomic import writing
-from vdsm_pin.kept import note_planned
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import HANDED_OUT
 from vdsm_pin.report.facts import batch_row

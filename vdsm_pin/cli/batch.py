@@ -85,10 +85,10 @@ def batch(
     """
     import json
 
+    from vdsm_pin.app.first_plan import COLD_LIMIT, default_limit
     from vdsm_pin.batch.folders import passed_over
     from vdsm_pin.batch.run import Batch, Interrupted, run_batch
     from vdsm_pin.batch.task import Settings
-    from vdsm_pin.kept import COLD_LIMIT, default_limit
     from vdsm_pin.report.words import outcome
     from vdsm_pin.text import printable
 

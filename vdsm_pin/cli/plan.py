@@ -50,9 +50,9 @@ def plan(
     required is written, is called incomplete, and ends with status 1. Errors are added
     to those of the problem file; the plan keeps its clearances under them.
     """
+    from vdsm_pin.app.first_plan import note_planned
     from vdsm_pin.app.problems import read_problem
     from vdsm_pin.app.workflow import plan_to_folder
-    from vdsm_pin.kept import note_planned
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
@@ -79,7 +79,7 @@ def _planning(limit: float | None) -> Iterator[Deadline]:
 
     Where there is no plan, the error says what was spent on it.
     """
-    from vdsm_pin.kept import default_limit, is_cold, note_planned
+    from vdsm_pin.app.first_plan import default_limit, is_cold, note_planned
 
     compiles, begin = limit is None and is_cold(), time.monotonic()
     try:
