@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from itertools import product
 from math import inf
 from pathlib import Path
@@ -61,10 +62,14 @@ METHODS: Final = {
 }
 """Methods by name, with the number of the paper's reference."""
 
+LIBRARIES: Final = ("pink", "daqp", "ompl", "scipy")
+"""What the methods are made with."""
+
 LIMIT: Final = 60.0
 """Processor time for one plan of a paper's scene; [s]."""
 SAMPLE_LIMIT: Final = 5.0
 """The same for a problem of the sample; [s]."""
+S_PER_HOUR: Final = 3600.0
 PER_FAMILY: Final = 112
 """Problems of HRM-1000 in a family."""
 INTELLIGENT: Final = tuple(
@@ -145,8 +150,10 @@ def drawn(method: str, lines: list[Line]) -> list[str]:
     whole = [one for one in mine if one.answer == "certified"]
     refuted = sum(one.answer in ("refuted", "undecided") for one in mine)
     late = sum(one.answer == "out of time" for one in mine)
-    lost = len(mine) - len(whole) - refuted - late
-    cells = [method, f"{len(whole)} of {len(mine)}", *map(str, (refuted, lost, late))]
+    failed = sum(one.answer == "error" for one in mine)
+    lost = len(mine) - len(whole) - refuted - late - failed
+    words = f"{lost}, and {failed} failed" if failed else str(lost)
+    cells = [method, f"{len(whole)} of {len(mine)}", str(refuted), words, str(late)]
     for key, form in MEASURED.values():
         values = [v for one in whole if (v := getattr(one, key)) is not None]
         cells.append(cell(median(values) if values else None, form))
@@ -190,13 +197,18 @@ def markdown(lines: list[Line], sampled: list[Line]) -> str:
     if not sampled:
         return "\n".join([*head, *rows, ""])
     most, families = len(own("paper", sampled)), len(FAMILIES) - 1
+    every, each = families * PER_FAMILY, sum(one.seconds for one in sampled) / most
     words = [
         "",
         "## A sample of HRM-1000",
         "",
         f"The first {most // families} of the {PER_FAMILY} problems of each of the",
         f"{families} feasible families, {SAMPLE_LIMIT:.0f} s of processor time for",
-        f"each plan. Those that evolve or swarm have {GENERATIONS} generations of",
+        f"each plan: {most} of {every}, the same for every method. All together plan",
+        f"one in {at_least(each)} s of processor time, and would all {every} in",
+        f"{at_least(each * every / S_PER_HOUR, 1)} hours, the judge not counted.",
+        "",
+        f"Those that evolve or swarm have {GENERATIONS} generations of",
         f"{MEMBERS} members for each unknown at a waypoint, and go on to the next as",
         "soon as their best, brought onto the path, is valid. Motions that the judge",
         "cannot decide count as refuted; not found are those that ended by",
@@ -216,6 +228,11 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=0)
     parser.add_argument("--minutes", type=float, default=inf)
     options = parser.parse_args()
+    missing = [name for name in LIBRARIES if find_spec(name) is None]
+    if missing:
+        parser.error(
+            f"{', '.join(missing)} missing: pip install 'vdsm-pin[references]'"
+        )
     with tempfile.TemporaryDirectory() as folder:
         for name in ("paper", "fewest"):  # machine code is loaded once
             list(lines_of(name, Path(folder)))

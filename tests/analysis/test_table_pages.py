@@ -21,6 +21,13 @@ def closed_loop(script: Any, rows: Rows) -> str:
     return str(script.markdown([row for row in rows if row not in swept], swept))
 
 
+def baselines(script: Any, rows: Rows) -> str:
+    lines = [script.Line(**row) for row in rows]
+    own = [line for line in lines if line.scene in script.SCENES]
+    rest = [line for line in lines if line.scene not in script.SCENES]
+    return str(script.markdown(own, rest))
+
+
 def step5_choices(script: Any, rows: Rows) -> str:
     literals = [script.Literal(**row) for row in rows if "line" not in row]
     singles = [script.OneLine(**row) for row in rows if "line" in row]
@@ -35,6 +42,7 @@ def plain(name: str) -> Callable[[Any, Rows], str]:
 
 
 PAGES = {
+    "baselines": ("baselines", baselines),
     "closed_loop": ("closed_loop", closed_loop),
     "moving_obstacle": ("moving_obstacle", plain("Line")),
     "obs2_orientations": ("obs2_orientations", plain("Row")),
@@ -50,3 +58,14 @@ def test_a_page_is_what_its_script_makes_of_its_numbers(page: str) -> None:
     file = ROOT / "reports/paper" / f"{page}.json"
     text = made(importlib.import_module(name), json.loads(file.read_text("utf-8")))
     assert file.with_suffix(".md").read_text("utf-8") == text
+
+
+def test_every_method_ran_on_the_same_problems_without_a_failure() -> None:
+    file = ROOT / "reports/paper/baselines.json"
+    rows = json.loads(file.read_text("utf-8"))
+    assert not [row for row in rows if row["answer"] == "error"]
+    scenes: dict[str, list[str]] = {}
+    for row in rows:
+        scenes.setdefault(row["method"], []).append(row["scene"])
+    assert set(scenes) == set(importlib.import_module("baselines").METHODS)
+    assert len({tuple(sorted(some)) for some in scenes.values()}) == 1
