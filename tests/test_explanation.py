@@ -151,3 +151,17 @@ def test_the_page_says_no_more_of_the_clearance_than_is_proved(tmp_path: Path) -
     assert len(cells) == 8
     for _, lower, upper in cells:
         assert float(lower) < float(upper)  # rounded apart
+
+
+def test_the_start_and_a_waypoint_beside_it_can_both_be_read(tmp_path: Path) -> None:
+    page, _ = explain_to_folder(read_problem("paper/obs3"), 1, tmp_path / "out")
+    text = page.read_text(encoding="utf-8")
+    words = {
+        word: (float(x), anchor)
+        for x, anchor, word in re.findall(
+            r'<text x="([-0-9.]+)"[^>]*text-anchor="(\w+)"[^>]*>(start|waypoint 1)<',
+            text,
+        )
+    }
+    (before, ends), (after, begins) = words["start"], words["waypoint 1"]
+    assert (ends, begins) == ("end", "start") and before < after

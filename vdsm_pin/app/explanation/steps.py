@@ -92,7 +92,7 @@ def route_step(moment: Moment) -> Part:
     region, way = _tip_region(moment), tips.points[:, 1:]
     made = pictures.canvas(moment, pictures.VIEWS["y"], region, [way])
     made.line(way, "route")
-    made.dot(way[0], "former", "start")
+    made.dot(way[0], "former", "start", beside=(-6.0, -6.0))
     made.dot(way[moment.row], "taken", f"waypoint {moment.row}")
     along = in_mm(float(tips.path_m[moment.row]))
     drawing = bool(tips.on_path[moment.row])
