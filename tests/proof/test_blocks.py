@@ -432,9 +432,11 @@ def test_a_plane_serves_up_to_the_first_bound_that_is_too_low_or_too_wide() -> N
         slack, width = rng.choice([0.0, 0.2]), 0.15
         bar = rng.choice([0.2, -1.0])
         lower[0] -= rng.integers(2)
-        good = (lower >= bar) & (upper - lower <= width + slack * upper)
+        far = rng.choice([0.4, np.inf])
+        part = np.where(lower < far, slack, 0.5)
+        good = (lower >= bar) & (upper - lower <= width + part * upper)
         first = int(np.argmin([*good, False]))
-        assert served(lower, upper, bar, slack, width) == first
+        assert served(lower, upper, bar, slack, width, far) == first
 
 
 def test_dense_rows_have_room_for_a_point_on_either_side() -> None:

@@ -722,9 +722,9 @@ def test_rounding_grows_with_what_is_far() -> None:
     extent, pad = TOLERANCES.scene_extent, TOLERANCES.arithmetic
     assert rounding_pad(0.0) == rounding_pad(extent) == pad
     assert rounding_pad(3.0 * extent) == pytest.approx(3.0 * pad)
-    rules = Budget(slack=0.5, until=7.0).rules(0.25)
+    rules = Budget(slack=0.5, until=7.0, far=3.0).rules(0.25)
     told = (TOLERANCES.bracket_gap, TOLERANCES.least_bracket)
-    assert rules == Rules(True, True, 0.25, *told, 0.5, 7.0)
+    assert rules == Rules(True, True, 0.25, *told, 0.5, 7.0, 3.0)
 
 
 def test_the_worst_of_verdicts_is_refuted() -> None:

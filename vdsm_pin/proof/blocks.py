@@ -38,7 +38,8 @@ def _serves(
     if block.mode == CLOSELY:
         bar = max(bar, results.limit[group] - rules.gap)
     lower, upper = runs.lower[:count], runs.upper[:count]
-    if served(lower, upper, bar, rules.slack, 2.0 * plane[WIDTH]) < count:
+    far = max(rules.far, results.limit[group])
+    if served(lower, upper, bar, rules.slack, 2.0 * plane[WIDTH], far) < count:
         return False
     best = results.best[pair]
     results.counts[pair, CERTIFIED] += count

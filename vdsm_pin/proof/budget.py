@@ -19,6 +19,8 @@ class Budget:
         slack: Brackets wider than this part of the clearance are asked of a new plane;
             [-].
         until: When to stop, by the monotonic clock; [s].
+        far: Brackets of clearances beyond it, and beyond the least one met, may be half
+            as wide as the clearance; [m].
     """
 
     slices: int = 20_000
@@ -26,6 +28,7 @@ class Budget:
     profile: int = 4_000_000
     slack: float = 0.02
     until: float = inf
+    far: float = inf
 
     def rules(self, pad: float) -> Rules:
         """The same for compiled code.
@@ -41,6 +44,7 @@ class Budget:
             gap=TOLERANCES.least_bracket,
             slack=self.slack,
             until=self.until,
+            far=self.far,
         )
 
 

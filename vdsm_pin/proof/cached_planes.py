@@ -4,7 +4,7 @@ Most pairs keep apart along much the same direction for many rows: the plane tha
 served last is tried first (temporal coherence).
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from vdsm_pin.proof.plane_bounds import Runs, bound_above, bound_below, take_dis
 from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.terms import Mover, Task
 
+WIDE: Final = 0.5
+"""Slack of clearances that are far; [-]."""
+
 
 class Demand(NamedTuple):
     """What a cached plane has to come up to.
@@ -27,6 +30,7 @@ class Demand(NamedTuple):
         last: One past the last.
         bar: A lower bound below it does not serve; [m].
         slack: As for `served`; inf where narrow brackets are not wanted.
+        far: As for `served`; [m].
         fresh: Whether the plane was made for the first interval: its bracket there is
             what the following ones are measured by.
         proved: Clearance proved for that interval otherwise, or -inf; [m].
@@ -36,13 +40,19 @@ class Demand(NamedTuple):
     last: int
     bar: float
     slack: float
+    far: float
     fresh: bool
     proved: float
 
 
 @compiled
 def served(
-    lower: FloatArray, upper: FloatArray, bar: float, slack: float, width: float
+    lower: FloatArray,
+    upper: FloatArray,
+    bar: float,
+    slack: float,
+    width: float,
+    far: float,
 ) -> int:
     """How many of the first intervals a plane serves.
 
@@ -52,18 +62,20 @@ def served(
         bar: A lower bound below it does not serve; [m].
         slack: Nor does a bracket wider than this part of its upper bound and
         width: this in sum; [m].
+        far: From this lower bound on the slack is WIDE at least; [m].
     """
-    missed = 0
+    missed, loose = 0, max(slack, WIDE)
     for r in range(lower.size):
-        low = not lower[r] >= bar
-        wide = not upper[r] - lower[r] <= width + slack * upper[r]
+        low, part = not lower[r] >= bar, slack if lower[r] < far else loose
+        wide = not upper[r] - lower[r] <= width + part * upper[r]
         missed |= low | wide
     if not missed:
         return lower.size
     for r in range(lower.size):
         if not lower[r] >= bar:
             return r
-        if not upper[r] - lower[r] <= width + slack * upper[r]:
+        part = slack if lower[r] < far else loose
+        if not upper[r] - lower[r] <= width + part * upper[r]:
             return r
     return lower.size
 
@@ -120,7 +132,8 @@ def try_plane(
             lower[0] = max(lower[0], demand.proved)
             plane[WIDTH] = upper[0] - lower[0] - mover.loose
         width = 2.0 * plane[WIDTH]
-        done = first + served(lower, upper, demand.bar, demand.slack, width)
+        slack, far = demand.slack, demand.far
+        done = first + served(lower, upper, demand.bar, slack, width, far)
         if not crudely or done == last:
             break
         crudely = False

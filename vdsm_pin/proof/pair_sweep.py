@@ -303,7 +303,8 @@ def sweep_pair(sweep: Sweep, pair: int, block: Block) -> bool:
         last, bar = min(count, local + window), required
         if closely:
             bar = max(bar, results.limit[group] - rules.gap)
-        demand = Demand(local, last, bar, slack, is_new, proved)
+        far = max(rules.far, results.limit[group])
+        demand = Demand(local, last, bar, slack, far, is_new, proved)
         done = local
         if is_new or plane[SUPPORT] > -np.inf:
             done = try_plane(task, mover, rows, runs, plane, demand)

@@ -8,6 +8,8 @@ against pieces at rest.
 
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
@@ -160,6 +162,8 @@ class Rules(NamedTuple):
             and wider by twice what it was when its plane was found; [-].
         until: When to stop, by the monotonic clock: what is not judged by then is not
             counted, or undecided; [s].
+        far: Of clearances beyond it, and beyond the least one met, wider brackets do;
+            [m].
     """
 
     steady: bool
@@ -169,6 +173,7 @@ class Rules(NamedTuple):
     gap: float
     slack: float
     until: float
+    far: float = np.inf
 
 
 class Task(NamedTuple):

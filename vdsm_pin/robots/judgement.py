@@ -28,7 +28,8 @@ WIDTH: Final = 0.2
 """Brackets wider than this part of the clearance are asked of a new plane; [-]."""
 
 NEAR: Final = 0.05
-"""Coal measures pairs that may come nearer than this beyond what is required; [m]."""
+"""Coal measures pairs that may come nearer than this beyond what is required; of others
+wider brackets do; [m]."""
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -58,7 +59,8 @@ def verify_robot(
         contacts: Whether to look for when bodies first and last come too close.
     """
     motion = AskedMotion.of_robot(cell.asked, path, cell.errors)
-    budget, extras = Budget(until=deadline.end, slack=WIDTH), BestEffort()
+    far = NEAR + max(cell.required_clearance, cell.required_self_clearance)
+    budget, extras = Budget(until=deadline.end, slack=WIDTH, far=far), BestEffort()
     proof, places = prove_motion(motion, budget), located(motion, deadline)
     asked = cell, path, proof.with_depths(deadline), places, extras, deadline
     found = judge_clearance(*asked, contacts=contacts)
