@@ -116,7 +116,11 @@ def test_one_pair_is_named_as_among_all() -> None:
     balls = [solids.Sphere(name, np.array([9.0, 0, 0]), 0.1) for name in ("a", "b")]
     asked = arm_assembly(problem_with(arm_with(tool=TOOL), *balls))
     assert {pair.obstacle for pair in asked.pairs} == {"a", "b", ""}
-    assert [asked.pair(k) for k in range(asked.table.size)] == [*asked.pairs]
+    pairs, n = asked.pairs, asked.table.size
+    assert [asked.pair(k) for k in range(n)] == [*pairs] == [pairs[k] for k in range(n)]
+    assert pairs[-2:] == tuple(pairs)[-2:] and pairs[-1] == asked.pair(n - 1)
+    with pytest.raises(IndexError):
+        pairs[n]
 
 
 @pytest.mark.parametrize("field", ["radius", "length"])

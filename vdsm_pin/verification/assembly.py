@@ -1,8 +1,9 @@
 """What every motion of a problem is asked: bodies on one tree, held apart in pairs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 
@@ -107,12 +108,10 @@ class Assembly:
             return Pair(link, obstacle, body=name)
         return Pair(link, "", self.links[other], name, self.names[other])
 
-    @cached_property
-    def pairs(self) -> tuple[Pair, ...]:
+    @property
+    def pairs(self) -> "NamedPairs":
         """Every pair by name, in the order of the table."""
-        sides = self.table.one, self.table.other
-        own, others = np.where(self.outer, sides[::-1], sides)
-        return tuple(map(self.pair_of, own.tolist(), others.tolist()))
+        return NamedPairs(self)
 
     def placed(self, number: int, poses: FloatArray) -> tuple[Placed, Placed]:
         """Both bodies of a pair where all frames stand, poses (n_frames, 4, 4); [m]."""
@@ -150,6 +149,38 @@ class Assembly:
         return ProofBox(
             joints, shifts, tilts, np.array([*[0.0] * len(self.own), *grown])
         )
+
+
+class NamedPairs(Sequence[Pair]):
+    """The pairs of an assembly by name, each named when it is asked for.
+
+    Args:
+        asked: Whose they are.
+    """
+
+    def __init__(self, asked: Assembly) -> None:
+        self._asked = asked
+
+    def __len__(self) -> int:
+        """Their number."""
+        return self._asked.table.size
+
+    @overload
+    def __getitem__(self, number: int) -> Pair: ...
+    @overload
+    def __getitem__(self, number: slice) -> tuple[Pair, ...]: ...
+    def __getitem__(self, number: int | slice) -> Pair | tuple[Pair, ...]:
+        """One by its number in the table, or some."""
+        if isinstance(number, slice):
+            return tuple(self)[number]
+        return self._asked.pair(range(len(self))[number])
+
+    def __iter__(self) -> Iterator[Pair]:
+        """Each of them, in the order of the table."""
+        asked = self._asked
+        sides = asked.table.one, asked.table.other
+        own, others = np.where(asked.outer, sides[::-1], sides)
+        return map(asked.pair_of, own.tolist(), others.tolist())
 
 
 def obstacle_growth(obstacles: Sequence[Obstacle], errors: ErrorBox) -> list[float]:
