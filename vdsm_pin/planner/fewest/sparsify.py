@@ -8,10 +8,11 @@ polygon of few.
 
 import itertools
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from vdsm_pin.geometry.arrays import BoolArray
 from vdsm_pin.planner.fewest.charts import coordinates, in_line
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, is_directed, standing
@@ -33,10 +34,32 @@ def sparser(judge: Judge, corners: Corners) -> Corners:
         corners: The motion; given by directions, it comes back by projections where all
             of it can be.
     """
-    corners = projected(judge, corners)
+    begin = _Bent.of(judge, projected(judge, corners))
     joints = range(1, judge.problem.manipulator.n_links)
-    both = _in_order(judge, corners, joints), _in_order(judge, corners, joints[::-1])
-    return min(both, key=lambda one: mean_knees(judge, one))
+    both = [_in_order(judge, begin, order) for order in (joints, joints[::-1])]
+    return min(both, key=lambda one: one.knees).corners
+
+
+class _Bent(NamedTuple):
+    """A motion and where it bends."""
+
+    corners: Corners
+    bent: BoolArray
+    """Whether joints are changed at corners, shape (n, N)."""
+
+    @classmethod
+    def of(cls, judge: Judge, corners: Corners) -> "_Bent":
+        bends = judge.bends(corners.tips, corners.offsets)
+        return cls(corners, bends > TOLERANCES.changed_angle)
+
+    @property
+    def knees(self) -> float:
+        """See `mean_knees`."""
+        knees = (self.bent[:-1] | self.bent[1:]).sum(axis=1)
+        length = np.abs(np.diff(self.corners.stations)) * self.corners.drawn
+        if not length.any():
+            length = np.full(len(knees), 1.0)
+        return float(np.average(knees, weights=length))
 
 
 def mean_knees(judge: Judge, corners: Corners) -> float:
@@ -45,26 +68,22 @@ def mean_knees(judge: Judge, corners: Corners) -> float:
     From a corner to the next every joint is bent that is bent at either. Where the tip
     draws nothing, all intervals count alike.
     """
-    bent = judge.bends(corners.tips, corners.offsets) > TOLERANCES.changed_angle
-    knees = (bent[:-1] | bent[1:]).sum(axis=1)
-    length = np.abs(np.diff(corners.stations)) * corners.drawn
-    if not length.any():
-        length = np.full(len(knees), 1.0)
-    return float(np.average(knees, weights=length))
+    return _Bent.of(judge, corners).knees
 
 
-def _in_order(judge: Judge, corners: Corners, joints: range) -> Corners:
+def _in_order(judge: Judge, motion: _Bent, joints: range) -> _Bent:
     """The motion with joints made straight in an order, until none can be."""
-    fewest = mean_knees(judge, corners)
-    for _ in range(ROUNDS):
-        before = corners
-        for joint, way in itertools.product(joints, WAYS):
-            trial = _without(judge, corners, joint, way)
-            if trial is not corners and (knees := mean_knees(judge, trial)) < fewest:
-                corners, fewest = trial, knees
-        if corners is before:
+    steps, vain, fewest = [*itertools.product(joints, WAYS)], 0, motion.knees
+    for joint, way in ROUNDS * steps:
+        corners = _without(judge, motion, joint, way)
+        vain += 1
+        if corners is not motion.corners:
+            trial = _Bent.of(judge, corners)
+            if (knees := trial.knees) < fewest:
+                motion, fewest, vain = trial, knees, 0
+        if vain == len(steps):
             break
-    return corners
+    return motion
 
 
 def projected(judge: Judge, corners: Corners) -> Corners:
@@ -81,27 +100,32 @@ def projected(judge: Judge, corners: Corners) -> Corners:
     return trial if clear.all() else corners
 
 
-def _without(judge: Judge, corners: Corners, joint: int, way: int) -> Corners:
+def _without(judge: Judge, motion: _Bent, joint: int, way: int) -> Corners:
     """Corners with a joint straight where that can be; the same object if nowhere.
 
     Args:
         judge: Says what is clear.
-        corners: The motion.
+        motion: Its corners, and where they bend.
         joint: The joint, counted from 0.
         way: How it is made straight, see `in_line`.
     """
-    arm, tips = judge.problem.manipulator, corners.tips
+    arm, corners = judge.problem.manipulator, motion.corners
+    tips, bent = corners.tips, motion.bent
     on = np.append(corners.drawn, False) | np.append(False, corners.drawn)
     # Where nothing is drawn, the way to a goal counts. The start is where it is.
     on |= not on.any()
-    rows, trial = 1 + np.flatnonzero(on[1:]), corners.offsets.copy()
-    bent = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
-    rows, before = rows[bent[:, joint]], bent[bent[:, joint]].sum(axis=1)
+    rows = 1 + np.flatnonzero((on & bent[:, joint])[1:])
     if not len(rows):
         return corners
+    before, trial = bent[rows].sum(axis=1), corners.offsets.copy()
     trial[rows] = in_line(arm, tips[rows], trial[rows], joint, way)
     after = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
-    rows = rows[after.sum(axis=1) < before]
+    fewer = after.sum(axis=1) < before
+    rows, wanted = rows[fewer], bent.copy()
+    wanted[rows] = after[fewer]
+    # Who bends others instead from one corner to the next gains nothing.
+    if not motion._replace(bent=wanted).knees < motion.knees:
+        return corners
     better = np.zeros(len(on), dtype=np.bool_)
     better[rows] = judge.look(tips[rows], trial[rows]).clearances >= judge.required
     asked = better
