@@ -82,7 +82,7 @@ def test_each_link_keeps_its_own() -> None:
     rows = path_rows(task.path)
     route = tip_route(task, rows, np.zeros(len(rows.tips), dtype=np.bool_), 0.2, 0.0)
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.2, 8)
-    judge = Judge(task, clearance, 0.0, 0.0, 2e-3, kept=kept)
+    judge = Judge(task, clearance, 0.0, 0.0, 2e-3, link_margins=kept)
     bare = Judge(task, clearance, 0.0, 0.0, 2e-3)
     made, free = (build_roadmap(one, weights, route, shapes) for one in (judge, bare))
     tip, shape = np.divmod(free.node, shapes.size)

@@ -270,7 +270,7 @@ class _Judges:
             level.finest * length,
             max(level.ease, self.least_ease),
             rough=self.clearance.up_to(worth),
-            kept=margins,
+            link_margins=margins,
         )
 
 

@@ -107,7 +107,7 @@ class Judge:
         ease: Part of the largest link angle that may be used; [-].
         rough: A cheaper clearance function, for single configurations; None for the
             same one.
-        kept: What each link keeps besides, shape (N,); None for nothing; [m].
+        link_margins: What each link keeps besides, shape (N,); None for nothing; [m].
     """
 
     def __init__(
@@ -119,9 +119,10 @@ class Judge:
         finest: float,
         ease: float = 1.0,
         rough: LinkClearance | None = None,
-        kept: FloatArray | None = None,
+        link_margins: FloatArray | None = None,
     ) -> None:
-        self.problem, self.clearance, self.kept = problem, clearance, kept
+        self.problem, self.clearance = problem, clearance
+        self.link_margins = link_margins
         self.rough = clearance if rough is None else rough
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
@@ -182,7 +183,7 @@ class Judge:
         are not equally thick, or are held apart from different obstacles.
         """
         knees = intervals.knees(self.problem.manipulator)
-        if self.kept is not None:
+        if self.link_margins is not None:
             return np.ones_like(knees)
         held = self.problem.held
         return knees if held.alike else knees | held.cuts
@@ -224,8 +225,8 @@ class Judge:
         if len(pieces):
             links = (place % asked.shape[1])[:, None]
             clearances.ravel()[place] = clearance(pieces, links)[:, 0]
-        if self.kept is not None:
-            clearances -= self.kept
+        if self.link_margins is not None:
+            clearances -= self.link_margins
         return centres, clearances
 
     def clear(

@@ -124,7 +124,7 @@ def build_roadmap(
         around: Only the straight arm is tried at tips farther than this many tips from
             where the straight arm does not do; None: every shape at every tip.
     """
-    problem, kept = judge.problem, judge.kept
+    problem, margins = judge.problem, judge.link_margins
     arm, aims = problem.manipulator, _aims(problem, route)
 
     def tried(whole: BoolArray) -> Roadmap:
@@ -136,7 +136,7 @@ def build_roadmap(
             there, axes = aims[node // shapes.size], ends[:, 2] - ends[:, 1]
             looks = judge.cone.holds(ends[:, 0, 0], axes, there)
             node, ends, bends = node[looks], ends[looks], bends[looks]
-        if kept is not None or not problem.held.alike:
+        if margins is not None or not problem.held.alike:
             ends = link_by_link(ends, arm.stations)
         clearances = _least(judge, ends)
         keep, empty = clearances >= judge.required, Roadmap.empty(route, shapes)
@@ -169,11 +169,11 @@ def _least(judge: Judge, ends: FloatArray) -> FloatArray:
         judge: Says what is kept.
         ends: Ends of the pieces, shape (v, p + 1, 3); [m].
     """
-    clearances, kept = np.full(len(ends), np.inf), judge.kept
+    clearances, margins = np.full(len(ends), np.inf), judge.link_margins
     rows = np.arange(len(ends))
     for piece in range(ends.shape[1] - 2, -1, -1):
         values = judge.rough(ends[rows, piece : piece + 2], piece)[:, 0]
-        values = values if kept is None else values - kept[piece]
+        values = values if margins is None else values - margins[piece]
         clearances[rows] = np.minimum(clearances[rows], values)
         rows = rows[values >= judge.required]
     return clearances

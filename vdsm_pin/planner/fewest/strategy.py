@@ -85,7 +85,7 @@ def plan_clearest(
     plan = plans[-1]
     if not problem.scene.obstacles:
         return plan
-    note = told(search.kept + reserve)
+    note = told(search.clearance_kept + reserve)
     return replace(plan, notes=(*plan.notes, note))
 
 
@@ -140,7 +140,7 @@ class _Search:
     weights: CostWeights
 
     @property
-    def kept(self) -> float:
+    def clearance_kept(self) -> float:
         """Clearance that every plan keeps; [m]."""
         return self.problem.required_clearance + self.margin
 
@@ -230,16 +230,16 @@ class _Search:
 
     def clearer(self, first: Plan) -> tuple[list[Plan], float]:
         """Plans with more and more clearance, and what the last has in reserve; [m]."""
-        low = float(self.clearance(first.centres).min()) - self.kept
+        low = float(self.clearance(first.centres).min()) - self.clearance_kept
         start = float(self.clearance(first.centres[:1]).min())
-        high = min(self._clearance_at_tips(first), start) - self.kept
+        high = min(self._clearance_at_tips(first), start) - self.clearance_kept
         return widest(self.with_reserve, first, low, high)
 
     def sturdier(self, first: Plan) -> list[Plan]:
         """Plans whose links keep what larger and larger joint errors use up."""
         reach = float(levers(self.problem.manipulator)[-1])
         high = min(
-            (self._clearance_at_tips(first) - self.kept) / reach,
+            (self._clearance_at_tips(first) - self.clearance_kept) / reach,
             self.survived(first.centres[:1]),
         )
         return widest(self.with_joint_error, first, self.survived(first.centres), high)[
@@ -248,7 +248,7 @@ class _Search:
 
     def survived(self, centres: FloatArray) -> float:
         """Error of all joints that configurations have room for, roughly; [rad]."""
-        clearances = self.clearance(centres) - self.kept
+        clearances = self.clearance(centres) - self.clearance_kept
         return float((clearances / levers(self.problem.manipulator)).min())
 
     def _clearance_at_tips(self, plan: Plan) -> float:
