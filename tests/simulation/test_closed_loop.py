@@ -142,6 +142,18 @@ def test_a_kick_at_no_joint_is_refused() -> None:
         run(kicks=(Kick(axis="theta", joint=9, share=0.1, torque_nm=1.0),))
 
 
+def test_settings_that_do_not_fit_the_arm_are_refused_by_their_file(
+    tmp_path: Path,
+) -> None:
+    kick = Kick(axis="theta", joint=9, share=0.1, torque_nm=1.0)
+    problem, rows = read_problem("paper/obs3"), tmp_path / "t.csv"
+    vp.write_trajectory(rows, bending(10, angle=0.02))
+    settings, file = Settings(kicks=(kick,)), tmp_path / "set.yaml"
+    order = SimulationOrder(problem, rows, tmp_path / "out", settings, file)
+    with pytest.raises(InvalidInput, match=r"set\.yaml: kicks\[0\]\.joint is 9"):
+        simulate_to_folder(order)
+
+
 def test_a_step_at_which_it_diverges_is_told() -> None:
     with pytest.raises(VerificationFailed, match="diverges"):
         run(step_s=0.02, controller=Controller(period_s=0.02))

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 from pydantic import Field
 
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.source import check_is_file, check_unchanged, sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -116,6 +116,16 @@ def _check_outputs(order: SimulationOrder) -> None:
     check_kept(outputs, filter(None, read))
 
 
+def _check_settings(order: SimulationOrder) -> None:
+    """Refuse settings that do not fit the arm, by the name of their file."""
+    try:
+        order.settings.check(order.problem.manipulator.n_links)
+    except InvalidInput as error:
+        if order.settings_file is None:
+            raise
+        raise InvalidFile(file=order.settings_file, problem=str(error)) from error
+
+
 def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
     """Run a plan in closed loop; write executed.csv, simulation.csv, .json and .html.
 
@@ -132,6 +142,7 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
             "nothing could be said of its clearance"
         )
         raise InvalidInput(message)
+    _check_settings(order)
     check_is_file(order.trajectory)
     digest = sha256_of_file(order.trajectory)
     arm, asked = problem.manipulator, problem.tip_path is not None
