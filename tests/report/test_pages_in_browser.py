@@ -217,6 +217,33 @@ def test_the_keyboard_reaches_everything_and_shows_where_it_is(report: Watched) 
     assert page.evaluate("vdsm.motion.playing") is False
 
 
+def test_keys_turn_the_scene_and_come_nearer(report: Watched) -> None:
+    """Oracle: a turn keeps the distance from what is looked at, a step scales it."""
+    page = report.page
+    page.evaluate("vdsm.motion.go(7); vdsm.view.look('overview')")
+    seen = """() => { const { camera, target } = vdsm.view.cameras;
+      return [...camera.position.clone().sub(target).toArray(), camera.zoom]; }"""
+    page.locator("#view canvas[role=img]").focus()
+    away = {}
+    for key in ("Shift", "ArrowRight", "ArrowUp", "ArrowLeft", "ArrowDown", "+", "-"):
+        page.keyboard.press(key)
+        away[key] = np.array(page.evaluate(seen)[:3])
+    far = {key: np.linalg.norm(place) for key, place in away.items()}
+    assert np.linalg.norm(away["ArrowRight"] - away["Shift"]) > 0.1 * far["Shift"]
+    assert away["ArrowUp"][1] > away["ArrowRight"][1] == pytest.approx(away["Shift"][1])
+    assert away["ArrowDown"] == pytest.approx(away["Shift"])
+    assert list(far.values()) == pytest.approx(
+        [far["Shift"]] * 5 + [0.9 * far["-"], far["-"]]
+    )
+    assert time_of(report) == 7.0
+    page.locator("[data-look=side]").click()
+    page.locator("#view canvas[role=img]").focus()
+    page.keyboard.press("+")
+    assert page.evaluate(seen)[3] == pytest.approx(1.0 / 0.9)
+    page.locator("[data-look=overview]").click()
+    assert report.errors == []
+
+
 def test_every_text_keeps_its_contrast(browser: Any, tmp_path: Path) -> None:
     judged = made_up.verification(Verdict.REFUTED, n=40, joint_error=math.nan)
     late = Check("late", Verdict.UNDECIDED, 1, 2.0, 1.0, "m", moment=30.0)

@@ -11,6 +11,9 @@ const FIELD = 36; // degrees
 const FIELD_AT_TIP = 70;
 const FLIGHT = 700; // milliseconds
 const ROOM = 1.06; // around what has to fit
+const TURNS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+const TURN = Math.PI / 24; // by one key
+const NEARER = { "+": 0.9, "=": 0.9, "-": 1 / 0.9 };
 
 class Cameras {
   constructor(view) {
@@ -94,6 +97,23 @@ class Cameras {
       distance = Math.max(distance, z + room + ROOM * wide);
     }
     this.put(middle.clone().addScaledVector(away, distance), middle);
+  }
+
+  // Turn or come nearer by one key; whether it was such a key.
+  press(key) {
+    if (!(key in TURNS || key in NEARER) || !this.viewer.controls.enabled) return false;
+    this.flying = null;
+    const { Spherical } = MeshCat.THREE;
+    const away = new Spherical().setFromVector3(this.camera.position.clone().sub(this.target));
+    const [across, down] = TURNS[key] || [0, 0];
+    away.theta += across * TURN;
+    away.phi += down * TURN;
+    away.makeSafe();
+    if (this.camera === this.flat) this.flat.zoom /= NEARER[key] || 1;
+    else away.radius *= NEARER[key] || 1;
+    this.camera.updateProjectionMatrix();
+    this.put(this.target.clone().add(this.target.clone().setFromSpherical(away)), this.target);
+    return true;
   }
 
   put(place, target) {

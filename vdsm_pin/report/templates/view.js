@@ -330,7 +330,15 @@ function makeView(pane, scene, motion) {
     const view = new ArmView(pane, scene, motion);
     const canvas = pane.querySelector("canvas");
     canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", "The arm in its scene, in 3D");
+    canvas.setAttribute("aria-label",
+      "The motion in its scene, in 3D: arrow keys turn it, plus and minus come nearer and go back");
+    canvas.tabIndex = 0;
+    canvas.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.altKey || event.metaKey) return;
+      if (!view.cameras.press(event.key)) return;
+      event.preventDefault();
+      event.stopPropagation();
+    });
     return view;
   } catch (error) {
     pane.innerHTML =
