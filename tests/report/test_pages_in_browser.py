@@ -411,7 +411,7 @@ def test_the_plots_of_a_simulation_share_one_moment(
     beside = np.column_stack([times[[0, -1]], [90.0, 60.0]])
     none, tensions = np.zeros(n), np.full((n, 24), 50.0)
     run = Simulation(
-        *(times, planned, planned + 0.001, tensions, none, none, beside, beside),
+        *(times, planned, planned + 0.001, tensions, none, beside, beside),
         largest_errors=np.full(17, 0.001),
         largest_tension=50.0,
     )
