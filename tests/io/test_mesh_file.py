@@ -205,6 +205,7 @@ def with_count(count: int) -> bytes:
     return whole[:80] + count.to_bytes(4, "little") + whole[84:]
 
 
+FACET = "outer loop\n" + 3 * "vertex 0 0 0\n" + "endloop\n"
 DAMAGE = [
     ("a.stl", b"", "is empty"),
     ("a.stl", b"\x01" * 50, "is neither text nor binary STL: only 50 bytes"),
@@ -218,6 +219,11 @@ DAMAGE = [
         "a.stl",
         "solid\nouter loop\nvertex 0 0 0\nendloop\nendsolid",
         "has 1 corners",
+    ),
+    (
+        "a.stl",
+        "solid\n" + FACET + FACET.replace("end", "vertex 1 1 1\nend") + "endsolid\n",
+        "line 12: the facet has 4 corners, expected 3",
     ),
     ("a.stl", "solid \xff".encode("latin-1"), "is truncated"),
     ("a.stl", text_stl(TETRAHEDRON).encode("utf-16"), "is UTF-16 text, expected"),
