@@ -233,6 +233,20 @@ def test_pairs_of_planes_for_single_pieces_are_told() -> None:
     assert first_pose[1][0].entries() == [0, 0, 0]
 
 
+def test_lines_end_with_the_last_interval_and_not_before() -> None:
+    joint = Joint(0, SLIDES, (1, 0, 0), np.eye(4), (0, 1.0, 0.0))
+    lines = [{"k": k, "proofs": []} for k in range(3)]
+    for count in range(4):
+        path = Path(Branch(np.array([[0.0], [0.1], [0.3]]), None))
+        clearances = Clearances(Tree([joint]), path, [])
+        if count == 2:
+            clearances.check(iter(lines[:count]))
+            continue
+        told = "beyond the last row" if count > 2 else f"interval {count} is missing"
+        with pytest.raises(Rejected, match=told):
+            clearances.check(iter(lines[:count]))
+
+
 @pytest.mark.parametrize("at_once", [0, 1, 5])
 def test_planes_are_settled_before_more_wait_than_are_looked_at_at_once(
     at_once: int, monkeypatch: pytest.MonkeyPatch
