@@ -186,7 +186,8 @@ def explore(
         if now.beats(best):
             best = now
         best = replace(best, stuck=stuck)
-        if not best.missing > 0.0 and BESIDE in levels and room.one_knee_draws:
+        inserted = isinstance(level, Insert) and not best.missing > 0.0
+        if inserted and BESIDE in levels and room.one_knee_draws:
             best = best.sparser()
             if best.knees > FEW_KNEES:
                 # It draws the path whole; a roadmap may with fewer knees.
