@@ -26,7 +26,7 @@ from typing import Final
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import yaml
-from result_files import REPORTS, at_least, table_lines, write_table
+from result_files import REPORTS, at_least, at_most, table_lines, write_table
 
 from benchmarks.hrm1000.families import FAMILIES
 from benchmarks.hrm1000.generate import generate
@@ -205,8 +205,8 @@ def markdown(lines: list[Line], sampled: list[Line]) -> str:
         f"The first {most // families} of the {PER_FAMILY} problems of each of the",
         f"{families} feasible families, {SAMPLE_LIMIT:.0f} s of processor time for",
         f"each plan: {most} of {every}, the same for every method. All together plan",
-        f"one in {at_least(each)} s of processor time, and would all {every} in",
-        f"{at_least(each * every / S_PER_HOUR, 1)} hours, the judge not counted.",
+        f"one in {at_most(each)} s of processor time, and would all {every} in",
+        f"{at_most(each * every / S_PER_HOUR, 1)} hours, the judge not counted.",
         "",
         f"Those that evolve or swarm have {GENERATIONS} generations of",
         f"{MEMBERS} members for each unknown at a waypoint, and go on to the next as",

@@ -164,8 +164,11 @@ def rows_of(scene: str, result: Refinement) -> list[Row]:
     ours = {
         "psi": ("largest psi [deg]", f"{np.rad2deg(psi.max()):.2f}"),
         "changed": ("link angles that change", changed(psi)),
-        "order": ("link angles in the order in which they begin", begun),
-        "ended": ("link angles in the order in which they return to zero", ended),
+        "order": ("link angles in the order in which they begin in Fig. 15", begun),
+        "ended": (
+            "link angles in the order in which they return to zero in Fig. 15",
+            ended,
+        ),
         "stretch": (
             "more than psi1 is changed, on the path (y, z) [mm]",
             stretch(result),
