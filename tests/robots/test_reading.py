@@ -100,6 +100,26 @@ def test_what_floats_stands_where_pinocchio_has_it(tmp_path: Path, kind: str) ->
         read_robot(RobotFiles(urdf, srdf, lock={"cart": 1.0}))
 
 
+@pytest.mark.parametrize(
+    ("slip", "meant"),
+    [("orgin", "origin"), ("Limit", "limit"), ("mimick", "mimic"), ("axes", "axis")],
+)
+def test_a_misspelt_element_of_a_joint_is_refused(
+    tmp_path: Path, slip: str, meant: str
+) -> None:
+    text = URDF.replace("<limit ", f"<{slip}/><limit ", 1)
+    said = f"<{slip}> is not read by anybody; is <{meant}> meant"
+    with pytest.raises(InvalidFile, match=said):
+        read_robot(RobotFiles(write(tmp_path, "slip.urdf", text)))
+
+
+@pytest.mark.parametrize("tag", ["friction", "hardwareInterface", "damping", "param"])
+def test_another_element_of_a_joint_is_noted(tmp_path: Path, tag: str) -> None:
+    text = URDF.replace("<limit ", f"<{tag}/><!-- odd --><limit ", 1)
+    (note,) = read_robot(RobotFiles(write(tmp_path, "odd.urdf", text))).notes
+    assert note.endswith(f"<{tag}> is not read")
+
+
 def test_prefixes_that_nothing_declares_are_read_as_ros_does(tmp_path: Path) -> None:
     """As in URDFs for Drake; `document.iter` sees them, Pinocchio the same joints."""
     text = URDF.replace("<limit ", '<limit drake:acceleration="2.5" ', 1)

@@ -7,6 +7,7 @@ negative mass and limits that are upside down; Pinocchio drops shapes it does no
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from typing import Final
 
 import numpy as np
@@ -43,6 +44,12 @@ ONCE: Final = (
     *("mass", "inertia"),
 )
 """Elements of which readers take the first and pass over others."""
+
+OF_JOINTS: Final = (
+    *("origin", "parent", "child", "axis", "limit", "mimic"),
+    *("dynamics", "calibration", "safety_controller"),
+)
+"""Elements that a joint may have."""
 
 
 def validate_urdf(text: str, *, geometry_only: bool = False) -> ET.Element:
@@ -128,6 +135,9 @@ def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"joint {joint.get('name', '')!r}"
     kind = joint.get("type", "")
     yield from _repeated(joint, where)
+    for tag in unknown_elements(joint):
+        if meant := get_close_matches(tag.lower(), OF_JOINTS, 1, 0.7):
+            yield f"{where}: <{tag}> is not read by anybody; is <{meant[0]}> meant?"
     kinds = ANY_JOINT_KINDS if geometry_only else JOINT_KINDS
     if kind not in kinds:
         yield f"{where}: type {kind!r}, expected one of {', '.join(kinds)}"
@@ -142,6 +152,12 @@ def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
         elif kind == "planar" and (axis[:2].any() or not axis[2] > 0.0):
             yield f"{where}: axis {text!r}, expected 0 0 1 of a planar joint"
     yield from _limit_problems(joint, where, optional=geometry_only)
+
+
+def unknown_elements(joint: ET.Element) -> list[str]:
+    """Tags within a joint that are none of a URDF, nor of another namespace."""
+    tags = (one.tag for one in joint if isinstance(one.tag, str))
+    return [tag for tag in tags if tag[:1] != "{" and tag not in OF_JOINTS]
 
 
 def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from vdsm_pin.arm.urdf_validator import validate_urdf
+from vdsm_pin.arm.urdf_validator import unknown_elements, validate_urdf
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.source import naming_file
 from vdsm_pin.proof.bodies import Body, LeftOut
@@ -67,7 +67,7 @@ def read_robot(files: RobotFiles) -> Robot:
 
 
 def _not_judged(document: ET.Element) -> Iterator[str]:
-    """Notes on links that are not judged, or that Pinocchio takes otherwise."""
+    """Notes on what is not judged or read, or that Pinocchio takes otherwise."""
     links = [
         link for link in document.findall("link") if link.find("visual") is not None
     ]
@@ -80,6 +80,10 @@ def _not_judged(document: ET.Element) -> Iterator[str]:
     if others:
         what = "Pinocchio's collision_checking is not read; cylinders have flat ends"
         yield f"{what}: {listed(others)}"
+    for joint in document.findall("joint"):
+        if tags := unknown_elements(joint):
+            named = ", ".join(f"<{tag}>" for tag in tags)
+            yield f"joint {joint.get('name', '')!r}: {named} is not read"
     words = (word for one in document.iter() for word in (one.tag, *one.attrib))
     spaces = {word[1:].partition("}")[0] for word in words if word.startswith("{")}
     if spaces:
