@@ -1,6 +1,7 @@
 """Errors as people state them: in degrees and millimetres, by joint and by obstacle."""
 
 import json
+import math
 import shlex
 from math import radians
 from pathlib import Path
@@ -57,7 +58,10 @@ def test_an_error_stated_twice_is_told_once_and_the_larger_counts() -> None:
     options = vp.ErrorBox(
         joint_deg={"J": 2.0, "K": 1.0}, obstacles_mm={"crate": 2.0, "a": 1.0}
     )
-    for box in (file.widened(options), options.widened(file)):
+    both = *file.obstacles, *options.obstacles
+    named = *file.named, *options.named
+    listed = error_boxes.ErrorBox(obstacles=both, named=named)
+    for box in (file.widened(options), options.widened(file), listed):
         words = errors(error_box(box)).split(", ")
         assert sorted(words) == [
             "1.000 mm of a",
@@ -65,6 +69,9 @@ def test_an_error_stated_twice_is_told_once_and_the_larger_counts() -> None:
             "±1.000° of K",
             "±2.000° of J",
         ]
+    none = error_boxes.ObstacleError("crate", math.nan)
+    with pytest.raises(InvalidInput, match="obstacle error is nan m"):
+        error_boxes.ErrorBox(obstacles=(*file.obstacles, none))
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,9 @@
 """Oracles: trimesh as a second reader of glTF, kinematics, pixels, stand-ins."""
 
+import errno
 import io
 import json
+import os
 import shutil
 import struct
 from dataclasses import replace
@@ -189,6 +191,22 @@ def test_glb_is_written_without_a_browser(
     assert ended.value.code == 0
     content, _ = opened((tmp_path / "near.glb").read_bytes())
     assert len(content["meshes"]) == 8 + 1 + 1
+
+
+def test_a_full_folder_of_temporary_files_is_not_told_as_the_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> list[bytes]:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/elsewhere/view.html")
+
+    monkeypatch.setattr("vdsm_pin.app.export.pictures", full)
+    file = write_problem(tmp_path / "near.yaml", NEAR)
+    with pytest.raises(SystemExit) as ended:
+        main(["export", str(file), "--out", str(tmp_path / "near.png")])
+    assert ended.value.code == 2
+    told = capsys.readouterr().err
+    assert "/elsewhere/view.html: No space left on device" in told
+    assert "near.png" not in told
 
 
 class TestWithABrowser:

@@ -54,6 +54,13 @@ def test_empty_documents_may_follow(end: str) -> None:
     assert read_yaml(f"---\na: 1\n{end}", file="f").data == {"a": 1}
 
 
+@pytest.mark.parametrize("word", [".inf", "+.Inf", "+.INF", "-.inf", ".NaN"])
+def test_no_number_is_a_word_of_its_own(word: str) -> None:
+    """By the core schema of YAML 1.2 (10.3.2)."""
+    (value,) = read_yaml(f"[{word}]", file=Path("a.yaml")).data
+    assert str(value) == str(float(word.replace(".", "").lower()))
+
+
 def test_texts_without_such_signs_are_read_as_before() -> None:
     rng = np.random.default_rng(0)
     letters = "ab: -\n'\"#\U000f0000é"

@@ -53,6 +53,8 @@ def test_each_outcome_has_its_place() -> None:
         "f": ["Failure"],
         "g": ["Failure"],
     }
+    (failure,) = list(suite)[1].result
+    assert failure.message == "too <near> & \\x00 broken"
 
 
 @pytest.mark.parametrize("rows", [ROWS, ROWS[:1], []])

@@ -64,9 +64,10 @@ class ErrorBox:
         base_turn: Largest rotation of the base about its origin; [rad].
         joints: Errors of alpha_i and theta_i by joint, of the first joints at least;
             where they are larger than `joint` they count; [rad].
-        obstacles: Errors of single obstacles; the larger shift counts.
+        obstacles: Errors of single obstacles, each kept once, the larger ones; the
+            larger shift of these and `obstacle` counts.
         slide: Error of every joint of a robot that slides; [m].
-        named: Errors of single joints of a robot; the larger one counts.
+        named: Errors of single joints of a robot, each kept once; the larger counts.
 
     Raises:
         InvalidInput: If a value is negative or not finite.
@@ -98,6 +99,8 @@ class ErrorBox:
                 what = f"{name.replace('_', ' ')} error is {found}"
                 message = f"{what}, expected 0 or more"
                 raise InvalidInput(message)
+        for field in ("obstacles", "named"):
+            object.__setattr__(self, field, _largest(getattr(self, field)))
 
     def __eq__(self, other: object) -> bool:
         """Whether the errors are the same, in whatever units they were stated."""
@@ -149,9 +152,9 @@ class ErrorBox:
 
     def of_obstacle(self, name: str) -> ObstacleError:
         """How far an obstacle may be off."""
-        mine = [one for one in self.obstacles if one.name == name]
-        shift = max([self.obstacle, *(one.shift for one in mine)])
-        return ObstacleError(name, shift, max([0.0, *(one.turn for one in mine)]))
+        mine = {one.name: one for one in self.obstacles}
+        own = mine.get(name, ObstacleError(name))
+        return replace(own, shift=max(self.obstacle, own.shift))
 
     def widened(self, other: "ErrorBox") -> "ErrorBox":
         """The least box that holds this one and another."""
@@ -161,8 +164,8 @@ class ErrorBox:
         return ErrorBox(
             **plain,
             joints=tuple((max(a[0], b[0]), max(a[1], b[1])) for a, b in both),
-            obstacles=_largest((*self.obstacles, *other.obstacles)),
-            named=_largest((*self.named, *other.named)),
+            obstacles=(*self.obstacles, *other.obstacles),
+            named=(*self.named, *other.named),
         )
 
 
