@@ -269,3 +269,11 @@ def test_a_change_that_matters_is_noticed_and_the_module_is_put_back(
         "7 -> 8 True",  # called at import
     }
     assert (tmp_path / "module.py").read_text() == module
+
+
+def test_what_is_listed_as_equivalent_is_there_as_it_was_judged(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    listed = program.EQUIVALENT.read_text(encoding="utf-8").splitlines()[1:]
+    assert len(program.equivalent_changes()) == len(listed) > 0
+    assert capsys.readouterr().out == ""
