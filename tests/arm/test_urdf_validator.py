@@ -149,7 +149,7 @@ BROKEN = {
     ),
     "collision in capitals": (
         replaced(TIP, '<link name="tip"><Collision/></link>'),
-        "link 'tip': a collision stands where it is not read, or in capitals",
+        "link 'tip': <Collision> is not read by anybody; is <collision> meant?",
     ),
     "collision within": (
         replaced(TIP, '<link name="tip"><x><collision/></x></link>'),

@@ -117,7 +117,41 @@ def test_a_misspelt_element_of_a_joint_is_refused(
 def test_another_element_of_a_joint_is_noted(tmp_path: Path, tag: str) -> None:
     text = URDF.replace("<limit ", f"<{tag}/><!-- odd --><limit ", 1)
     (note,) = read_robot(RobotFiles(write(tmp_path, "odd.urdf", text))).notes
-    assert note.endswith(f"<{tag}> is not read")
+    assert note.startswith(f"<{tag}> of joints is not read: ")
+
+
+@pytest.mark.parametrize(
+    ("before", "slip", "meant"),
+    [
+        ("<collision>", "<colision>", "collision"),
+        ("<origin ", "<orgin ", "origin"),
+        ("<geometry>", "<geometri>", "geometry"),
+        ("<link ", "<lnik ", "link"),
+        ("<joint ", "<Joint ", "joint"),
+    ],
+)
+def test_what_a_misspelt_element_leaves_out_is_not_judged_otherwise(
+    tmp_path: Path, before: str, slip: str, meant: str
+) -> None:
+    """A shape stood at its link's origin, or was not there at all."""
+    solid = (
+        '<collision><origin xyz="0 0 1"/><geometry><sphere radius="0.1"/></geometry>'
+        "</collision>"
+    )
+    tag, wrong = before.strip("< >"), slip.strip("< >")
+    text = f'<robot name="r"><link name="a">{solid}</link><link name="b"/><joint '
+    text += 'name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>'
+    read_robot(RobotFiles(write(tmp_path, "right.urdf", text)))
+    text = text.replace(before, slip, 1).replace(f"</{tag}>", f"</{wrong}>", 1)
+    with pytest.raises(InvalidFile, match=f"<{wrong}> is not read.* <{meant}> meant"):
+        read_robot(RobotFiles(write(tmp_path, "slip.urdf", text)))
+
+
+def test_another_element_of_a_collision_is_noted(tmp_path: Path) -> None:
+    """As SDF places shapes."""
+    text = URDF.replace("<collision>", "<collision><pose>1 0 0 0 0 0</pose>")
+    notes = read_robot(RobotFiles(write(tmp_path, "odd.urdf", text))).notes
+    assert [note for note in notes if note.startswith("<pose> of links is not read: ")]
 
 
 def test_prefixes_that_nothing_declares_are_read_as_ros_does(tmp_path: Path) -> None:

@@ -45,11 +45,17 @@ ONCE: Final = (
 )
 """Elements of which readers take the first and pass over others."""
 
-OF_JOINTS: Final = (
-    *("origin", "parent", "child", "axis", "limit", "mimic"),
-    *("dynamics", "calibration", "safety_controller"),
-)
-"""Elements that a joint may have."""
+KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
+    "robot": ("link", "joint"),
+    "joint": (
+        *("origin", "parent", "child", "axis", "limit", "mimic"),
+        *("dynamics", "calibration", "safety_controller"),
+    ),
+    "link": ("collision", "visual", "inertial"),
+    "visual": ("origin", "geometry", "material"),
+    "collision": ("origin", "geometry", "material", "verbose", "contact_coefficients"),
+}
+"""Elements that others may have, of which a misspelt one would be passed over."""
 
 
 def validate_urdf(text: str, *, geometry_only: bool = False) -> ET.Element:
@@ -93,6 +99,7 @@ def _problems(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
                 yield f"{count} {kind}s are named {name!r}; names are unique"
     for joint in robot.findall("joint"):
         yield from _joint_problems(joint, geometry_only)
+    yield from _misspelt(robot, "robot")
     yield from _tree_problems(robot)
     for link in robot.findall("link"):
         yield from _link_problems(link, geometry_only)
@@ -135,9 +142,7 @@ def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"joint {joint.get('name', '')!r}"
     kind = joint.get("type", "")
     yield from _repeated(joint, where)
-    for tag in unknown_elements(joint):
-        if meant := get_close_matches(tag.lower(), OF_JOINTS, 1, 0.7):
-            yield f"{where}: <{tag}> is not read by anybody; is <{meant[0]}> meant?"
+    yield from _misspelt(joint, where)
     kinds = ANY_JOINT_KINDS if geometry_only else JOINT_KINDS
     if kind not in kinds:
         yield f"{where}: type {kind!r}, expected one of {', '.join(kinds)}"
@@ -154,10 +159,16 @@ def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     yield from _limit_problems(joint, where, optional=geometry_only)
 
 
-def unknown_elements(joint: ET.Element) -> list[str]:
-    """Tags within a joint that are none of a URDF, nor of another namespace."""
-    tags = (one.tag for one in joint if isinstance(one.tag, str))
-    return [tag for tag in tags if tag[:1] != "{" and tag not in OF_JOINTS]
+def unknown_elements(element: ET.Element) -> list[str]:
+    """Tags within an element that are none of a URDF, nor of another namespace."""
+    tags = (one.tag for one in element if isinstance(one.tag, str))
+    return [tag for tag in tags if tag[:1] != "{" and tag not in KNOWN[element.tag]]
+
+
+def _misspelt(element: ET.Element, where: str) -> Iterator[str]:
+    for tag in unknown_elements(element):
+        if meant := get_close_matches(tag.lower(), KNOWN[element.tag], 1, 0.7):
+            yield f"{where}: <{tag}> is not read by anybody; is <{meant[0]}> meant?"
 
 
 def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[str]:
@@ -182,6 +193,7 @@ def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[s
 def _link_problems(link: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"link {link.get('name', '')!r}"
     yield from _repeated(link, where)
+    yield from _misspelt(link, where)
     inertial = link.find("inertial")
     if inertial is not None and not geometry_only:
         yield from _repeated(inertial, where)
@@ -194,6 +206,7 @@ def _link_problems(link: ET.Element, geometry_only: bool) -> Iterator[str]:
         yield f"{where}: a collision stands where it is not read, or in capitals"
     for shape in shown + link.findall("collision"):
         yield from _repeated(shape, where)
+        yield from _misspelt(shape, f"{shape.tag} of {where}")
         yield from _origin_problems(shape, where)
         yield from _shape_problems(shape, where, sizes)
 

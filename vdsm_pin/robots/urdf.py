@@ -80,10 +80,15 @@ def _not_judged(document: ET.Element) -> Iterator[str]:
     if others:
         what = "Pinocchio's collision_checking is not read; cylinders have flat ends"
         yield f"{what}: {listed(others)}"
-    for joint in document.findall("joint"):
-        if tags := unknown_elements(joint):
-            named = ", ".join(f"<{tag}>" for tag in tags)
-            yield f"joint {joint.get('name', '')!r}: {named} is not read"
+    for kind, place in (("joint", "."), ("link", "collision")):
+        having: dict[str, list[str]] = {}
+        for one in document.findall(kind):
+            for tag in (
+                t for part in one.findall(place) for t in unknown_elements(part)
+            ):
+                having.setdefault(tag, []).append(one.get("name", ""))
+        for tag, names in having.items():
+            yield f"<{tag}> of {kind}s is not read: {listed(names)}"
     words = (word for one in document.iter() for word in (one.tag, *one.attrib))
     spaces = {word[1:].partition("}")[0] for word in words if word.startswith("{")}
     if spaces:
