@@ -1,13 +1,19 @@
 """numba as it comes gives what our own way of keeping machine code gives."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from types import FunctionType
 
+import numba
 import pytest
+from numba.core.compiler import Compiler
 
-from vdsm_pin.compiled import choice, compiling
+from vdsm_pin.compiled import choice, compiled, compiling
+from vdsm_pin.compiled.digests import digest_of
+from vdsm_pin.compiled.intrinsics import pipeline
 
 PROGRAM = """
 import time
@@ -74,3 +80,23 @@ def test_numba_that_lacks_something_is_used_as_it_comes(
         monkeypatch.undo()
         choice.compiler.cache_clear()
     assert choice.compiler() is compiling
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_what_is_not_to_be_copied_is_told_to_llvm_and_is_other_code() -> None:
+    def double(value: float) -> float:
+        return 2.0 * value
+
+    told, digests = [], []
+    for inline in (True, False):
+        function = FunctionType(double.__code__, globals(), "double")
+        compiled(function, inline=inline)
+        made = numba.njit(pipeline_class=pipeline(function, Compiler))(function)
+        assert made(1.5) == 3.0
+        (text,) = made.inspect_llvm().values()
+        own = re.search(r"define .*double.*?#(\d+)", text)
+        group = re.search(rf"attributes #{own[1]} = {{(.*)}}", text) if own else None
+        told.append("noinline" in (group[1] if group else ""))
+        digests.append(digest_of(function))
+    assert told == [False, True]
+    assert digests[0] != digests[1]
