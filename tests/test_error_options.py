@@ -75,6 +75,19 @@ def test_an_error_stated_twice_is_told_once_and_the_larger_counts() -> None:
 
 
 @pytest.mark.parametrize(
+    ("stated", "shift", "turn"),
+    [("shift: 2", 0.002, 0.0), ("turn_deg: 3", 0.0, radians(3.0)), ("shift: 0", 0, 0)],
+)
+def test_an_error_of_an_obstacle_that_is_not_stated_is_none(
+    stated: str, shift: float, turn: float, tmp_path: Path
+) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text(f"{TEXT}errors: {{obstacles: [{{name: b, {stated}}}]}}\n")
+    found = vp.read_problem(str(file)).errors.of_obstacle("b")
+    assert (found.shift, found.turn) == (shift, turn)
+
+
+@pytest.mark.parametrize(
     "joint, shifts, turns, words",
     [
         ("x", None, None, "--joint-error-deg is 'x'"),

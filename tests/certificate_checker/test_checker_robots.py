@@ -262,6 +262,26 @@ def test_a_joint_follows_one_of_one_value(tmp_path: Path, leader: str) -> None:
         Model(RobotFiles(path), np.eye(4))
 
 
+def test_a_joint_follows_one_that_follows_another(tmp_path: Path) -> None:
+    """By the product of their multipliers; offsets go through the second one."""
+    joints = (
+        ("one", "a", "b", ""),
+        ("two", "b", "c", '<mimic joint="one" multiplier="-0.5" offset="0.1"/>'),
+        ("three", "c", "d", '<mimic joint="two" multiplier="3" offset="-1"/>'),
+    )
+    text = "".join(
+        f'<link name="{child}"/><joint name="{name}" type="revolute">'
+        f'<parent link="{parent}"/><child link="{child}"/>{more}'
+        '<limit lower="-9" upper="9" effort="1" velocity="1"/></joint>'
+        for name, parent, child, more in joints
+    )
+    path = tmp_path / "r.urdf"
+    path.write_text(f'<robot name="r"><link name="a"/>{text}</robot>')
+    values = Model(RobotFiles(path), np.eye(4)).values
+    assert values["two"] == (0, -0.5, 0.1)
+    assert values["three"] == pytest.approx((0, -1.5, 0.3 - 1.0))
+
+
 SHAPED = """<robot name="r"><link name="l"><collision><origin xyz="-2 0 0"/>
 <geometry>{}</geometry></collision></link></robot>"""
 BALL = {"origin_m": [0.75, 0.0, 0.0], "edges_m": [], "radius_m": 0.5}

@@ -8,6 +8,7 @@ import pytest
 
 from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.certificate_checker.balls import Rejected
+from vdsm_pin.certificate_checker.solids import Mesh as MeshSolid
 from vdsm_pin.certificate_checker.solids import (
     Solid,
     away,
@@ -167,6 +168,35 @@ def test_hulls_of_closed_meshes_share_a_point_where_they_share_a_corner(
     for points, group, middle in zip(found, groups, middles, strict=True):
         expected = np.unique([*corners[group].reshape(-1, 3), middle], axis=0)
         np.testing.assert_allclose(points, expected, rtol=0, atol=1e-12)
+
+
+def test_two_hulls_of_two_closed_meshes_have_each_its_own_point() -> None:
+    """However near their boxes are."""
+    tips = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    faces = tips[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
+    corners = np.concatenate([faces, faces - [1.0 + 1e-4, 0.0, 0.0]])
+    found = hulls("m", corners, [[0, 1, 2, 3], [4, 5, 6, 7]])
+    for points, whole in zip(found, (corners[:4], corners[4:]), strict=True):
+        middle = whole.mean(axis=(0, 1))
+        expected = np.unique([*whole.reshape(-1, 3), middle], axis=0)
+        np.testing.assert_allclose(points, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("solid", [True, False])
+def test_a_mesh_on_a_link_is_covered_by_hulls_of_its_triangles(solid: bool) -> None:
+    """With a point in common where the inside is meant too."""
+    tips = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    order = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    mesh = MeshSolid(Mesh("part", tips, order, solid=solid))
+    (whole,) = mesh.parts(None)
+    expected = np.unique([*tips, *[tips.mean(axis=0)] * solid], axis=0)
+    assert whole.name == "part"
+    np.testing.assert_array_equal(whole.points[0], expected)
+    first, second = mesh.parts([[0, 1], [2, 3]])
+    assert (first.name, second.name) == ("part part 1", "part part 2")
+    assert len(first.points[0]) == len(second.points[0]) == 4 + solid
+    with pytest.raises(Rejected, match="pieces of part do not make up the whole"):
+        mesh.parts([[0, 1], [2]])
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.solids import PointCloud, Voxels
 from vdsm_pin.io.clouds import RawCloud, read_cloud
+from vdsm_pin.io.meshes.raw import MAX_CORNERS
 from vdsm_pin.io.pcd import _from_lzf
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -353,6 +354,10 @@ def test_odd_lines_of_points_are_told_apart(tmp_path: Path) -> None:
 
 
 BAD = {
+    "many.pcd": (
+        pcd("ascii", b"", MAX_CORNERS + 1),
+        f"has more than {MAX_CORNERS} ver",
+    ),
     "a.las": (b"x", "has the ending '.las', expected .ply, .pcd"),
     "b.xyz": (b"1 2\n", "line 1: found '1 2', expected 3 numbers"),
     "c.xyz": (b"1 2 3\n1 b 3\n", "line 2: found '1 b 3', expected 3 numbers"),

@@ -48,6 +48,16 @@ def test_a_point_stands_at_position_plus_turned_point(tmp_path: Path) -> None:
     np.testing.assert_allclose(base, turned, atol=1e-12)
 
 
+@pytest.mark.parametrize("whole", [3.6e11, -3.6e11, 0.0])
+def test_whole_turns_before_it_begins_cost_no_digits(
+    tmp_path: Path, whole: float
+) -> None:
+    motion = f"{{times_s: [0, 1], rpy_deg: [[0, 0, {whole}], [0, 0, {whole + 90.0}]]}}"
+    knots = read(tmp_path, motion).carrier.path.knots
+    np.testing.assert_allclose(np.ptp(knots, axis=0).max(), np.pi / 2, atol=1e-15)
+    assert np.abs(knots[:, 3:]).max() < 7.0
+
+
 @pytest.mark.parametrize(
     "motion, words",
     [
