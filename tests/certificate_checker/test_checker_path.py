@@ -2,14 +2,23 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from flint import arb, ctx
 
-from vdsm_pin.certificate_checker.balls import Rejected, column, norm, number, unit
+from vdsm_pin.certificate_checker.balls import (
+    SLACK,
+    Rejected,
+    column,
+    norm,
+    number,
+    unit,
+)
 from vdsm_pin.certificate_checker.path import Drawing
+from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.pointing import Pointing
 
@@ -177,3 +186,29 @@ def test_the_steepest_change_of_the_aim_is_that_of_one_side(
     assert found == pytest.approx((turned / sides).max(), rel=1e-12)
     straight = replace(asked, pointing=Pointing(0.1, directions=looks[:1]))
     assert float(Drawing(straight).steepest) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("strays", "drawn", "said"),
+    [
+        (0.0, 0.0, ""),
+        (0.5 * SLACK, -0.5 * SLACK, ""),
+        (2.0 * SLACK, 0.0, "the tip strays"),
+        (0.0, -2.0 * SLACK, "coverage is"),
+    ],
+)
+def test_rounding_is_all_that_a_drawing_may_fall_short(
+    strays: float, drawn: float, said: str
+) -> None:
+    path = SimpleNamespace(spacing=0.1, required_coverage=0.5)
+    asked = SimpleNamespace(path=path, tip_tolerance=1e-6)
+    drawing: Any = SimpleNamespace(
+        coverage=lambda: 0.5 + drawn, deviation=0.1 + strays, farthest=2.0, length=2.0,
+        left=False, closed=False,
+    )  # fmt: skip
+    rows: Any = SimpleNamespace(problem=asked, ordered=True)
+    if said:
+        with pytest.raises(Rejected, match=said):
+            Rows._drawn(rows, drawing)
+    else:
+        Rows._drawn(rows, drawing)
