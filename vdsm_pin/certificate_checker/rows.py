@@ -190,7 +190,7 @@ class Rows:
         Errors a and b of a joint's two axes, at right angles, turn what follows by t
         with cos(t / 2) = cos(a / 2) cos(b / 2).
         """
-        rail, *joints = motion.tree.joints[: 2 * len(self.arm.lengths) + 1]
+        rail, *joints = motion.tree.joints
         lever = sum(map(arb, self.arm.lengths), arb(0))
         x0 = max(motion.controls[0], key=lambda q: float(abs(q)))
         turned, moved = arb(rail.tilt), rail.slip + rail.tilt * (abs(x0) + lever)
