@@ -107,6 +107,7 @@ def test_a_problem_has_one_name_in_progress_table_junit_and_folder(
     assert {case.name for case in suite} == names
     page = (out / "index.html").read_text(encoding="utf-8")
     assert set(re.findall(r'<th scope="row" data-key="([^"]*)"', page)) == names
+    assert re.findall(r'<div class="soft">(.*?)</div>', page) == ["none.yaml", given[1]]
     rows = {row.folder: row.problem for row in read_summary(out / "summary.csv")}
     assert rows == dict(zip(("paper-free", "stem", "none"), given, strict=True))
 
