@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 from itertools import product
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, get_args
 
@@ -25,7 +26,7 @@ from vdsm_pin.certificate_writer.schema import (
     LinkPieces,
     Primitive,
 )
-from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.errors import CertificateTooLarge, VerificationFailed
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.solids import BOX_CORNERS, Prism
@@ -176,6 +177,26 @@ def test_lines_hold_what_their_limits_allow(
     for data in bad:
         with pytest.raises(ValidationError):
             model.model_validate(data)
+
+
+@pytest.mark.parametrize("most", [1000, 60])
+def test_each_line_has_a_limit_and_the_file_none(
+    most: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Lines come in parts, which belong together up to their end."""
+    parts = ["y" * 40 + "\n"] * 100 + ["x" * 40, "y" * 40 + "\n"]
+    monkeypatch.setattr(lines, "_lines", lambda *_: iter(parts))
+    monkeypatch.setattr(lines, "_check_size", lambda _: None)
+    monkeypatch.setattr(lines, "MAX_LINE", most)
+    header: Any = SimpleNamespace(model_dump_json=lambda: "{}")
+    nothing: Any = None
+    if most < 81:
+        with pytest.raises(CertificateTooLarge):
+            lines.write_lines(tmp_path / "c", header, nothing)
+        assert not (tmp_path / "c").exists()
+    else:
+        lines.write_lines(tmp_path / "c", header, nothing)
+        assert (tmp_path / "c").exists()
 
 
 def test_a_header_is_of_the_version_that_the_checker_reads() -> None:

@@ -13,7 +13,7 @@ import trimesh
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.geometry.arrays import distinct_rows, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
@@ -25,6 +25,7 @@ from vdsm_pin.geometry.solids import (
     PointCloud,
     Prism,
     Sphere,
+    Voxels,
 )
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -44,6 +45,7 @@ from vdsm_pin.verification.coal_check import check_coal
 from vdsm_pin.verification.coal_hulls import (
     FLAT,
     CoalBody,
+    coal_hull,
     coal_parts,
     hull_planes,
     is_solid,
@@ -191,6 +193,34 @@ def test_the_nearest_ball_of_a_cloud_is_found_where_a_manager_of_coal_errs() -> 
         manager.distance(coal.CollisionObject(coal.Sphere(0.1), pose), asked)
         wrong += abs(asked.data.result.min_distance - least) > 1e-3
     assert wrong > 10
+
+
+def test_the_nearest_of_many_is_found_from_every_side() -> None:
+    """A long rod beside balls and cells, in every pose; oracle: each by itself."""
+    rng, request = np.random.default_rng(6), distance_request()
+    rod, turn = coal.Capsule(0.02, 3.0), rotation_to(unit(rng))
+    cells = distinct_rows(rng.integers(-9, 9, (90, 3))).astype(float)
+    half = np.array([0.05, 0.04, 0.03])
+    grid = Voxels("v", 0.2 * cells @ turn.T, turn, half)
+    boxes = [coal_bodies(Box("b", c, turn, half)) for c in grid.centres]
+    points = rng.uniform(-1.0, 1.0, (90, 3))
+    balls = coal_bodies(PointCloud("c", points, 0.01))
+    alone = [coal_bodies(Sphere("s", point, 0.01)) for point in points]
+    wedge = coal_hull(np.array([1.0, 2.0, 3.0]) + 0.3 * rng.uniform(size=(20, 3)))
+    for _ in range(30):
+        centre, axis = rng.uniform(-1.5, 1.5, 3), unit(rng)
+        pose = coal.Transform3s(rotation_to(axis), centre)
+        along = np.clip((points - centre) @ axis, -1.5, 1.5)
+        gaps = np.linalg.norm(points - centre - along[:, None] * axis, axis=1) - 0.03
+        found = measure(request, rod, pose, balls)
+        assert max(found, 0.0) == pytest.approx(max(gaps.min(), 0.0), abs=1e-9)
+        least = min(measure(request, rod, pose, one) for one in boxes)
+        found = measure(request, rod, pose, coal_bodies(grid))
+        assert max(found, 0.0) == pytest.approx(max(least, 0.0), abs=1e-7)
+        pose.setTranslation(centre - pose.getRotation() @ [1.0, 2.0, 3.0])
+        least = min(measure(request, wedge, pose, one) for one in alone)
+        found = measure(request, wedge, pose, balls)
+        assert max(found, 0.0) == pytest.approx(max(least, 0.0), abs=1e-7)
 
 
 def test_the_nearest_part_counts_whatever_its_place_in_the_list() -> None:

@@ -5,6 +5,7 @@ from math import inf, nan
 from types import SimpleNamespace
 from typing import Any
 
+import made_up
 import numpy as np
 import pytest
 
@@ -147,3 +148,12 @@ def test_a_row_names_the_nearest_of_pairs_with_one_bound() -> None:
     empty = Check("clearance", Verdict.UNDECIDED, 0, nan, 0.1, "m")
     row = _row(empty, evidence, np.arange(3))
     assert (row.where, row.moment, row.worst) == ("near", 7.5, 0.2)
+
+
+def test_of_a_motion_alone_no_more_is_found_out_than_is_asked() -> None:
+    """No largest joint error, nothing left out; Coal beside the whole proof."""
+    found = verify(made_up.problem(), made_up.trajectory(20))
+    assert np.isnan(found.joint_error)
+    assert found.not_done == ()
+    (row,) = (row for row in found.checks if "Coal" in row.name)
+    assert row.where.endswith(f"; {row.count} of 1540 pairs measured")
