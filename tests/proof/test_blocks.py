@@ -444,3 +444,52 @@ def test_dense_rows_have_room_for_a_point_on_either_side() -> None:
     assert dense.own.shape == dense.other.shape == (5, 2, 3)
     flat = dense.lower, dense.upper, dense.time, dense.verdict
     assert {part.shape for part in flat} == {(5, 2)}
+
+
+@pytest.mark.parametrize("block", range(3))
+@pytest.mark.parametrize("place", [5, 40])
+def test_candidates_of_several_blocks_are_looked_at_where_they_are(
+    block: int, place: int
+) -> None:
+    """Between two rows of one block a ball comes nearer than at rows of the others."""
+    turns = np.full(3 * BLOCK + 1, 1.0)
+    for k in range(3):
+        row = k * BLOCK + place + 7 * k
+        turns[row : row + 2] = (-0.3, 0.3) if k == block else (0.5, 0.02)
+    tree = Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    bodies = [ball(1, 1.0), ball(0, 2.0)]
+    proof = prove(tree, bodies, Path(turns[:, None]), [Pair(0, 1)])
+    assert proof.lower[0] <= 0.8 <= proof.upper[0]
+    assert proof.upper[0] - proof.lower[0] < 1.1e-6
+
+
+@pytest.mark.parametrize("before", [0, BLOCK - 2, BLOCK - 1, BLOCK])
+def test_errors_count_in_every_interval_of_a_block(before: int) -> None:
+    """The last intervals of a full block as much as the same motion alone."""
+    tree = Tree((Joint(0, Kind.REVOLUTE, column=0),))
+    none, bodies = np.zeros(1), [ball(1, 1.0), ball(0, 2.0)]
+    errors = ErrorBox(np.array([0.1]), none, none)
+    turns = np.append(np.full(before, 1.5), [1.5, 1.2, 0.9])
+    found = prove(tree, bodies, Path(turns[:, None]), [Pair(0, 1)], errors)
+    ends = np.array([np.cos(0.8), np.sin(0.8)])
+    gap = np.hypot(*(ends - [2.0, 0.0])) - 0.2
+    assert gap - 0.01 < found.lower[0] <= gap
+
+
+def test_columns_of_a_profile_are_as_many_as_are_named() -> None:
+    tree, path = approaching(3)
+    for columns in ([0, 0], [0, 1], [1, 0]):
+        proof = prove(
+            tree, [ball(1, 0.0), ball(0, 2.0)], path, [Pair(0, 1)],
+            columns=np.array(columns),
+        )  # fmt: skip
+        assert proof.profile.shape[1] == max(columns) + 1
+
+
+def test_a_joint_keeps_its_place_whatever_becomes_of_what_it_was_made_of() -> None:
+    placement, axis = np.eye(4), np.array([1.0, 0.0, 0.0])
+    joint = Joint(0, Kind.PRISMATIC, axis, placement, column=0)
+    placement[0, 3] = axis[0] = 7.0
+    assert joint.placement[0, 3] == 0.0 and joint.axis[0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        joint.placement[0, 3] = 1.0
