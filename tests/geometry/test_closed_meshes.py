@@ -400,3 +400,15 @@ def test_closed_parts_hang_together_by_their_corners() -> None:
     tube = trimesh.creation.annulus(0.5, 1.0, 20.0, sections=60)  # a long chain
     parts = closed_parts(np.asarray(tube.triangles))
     assert parts is not None and not parts.any()
+
+
+@pytest.mark.parametrize(("order", "count"), [((0, 1, 2), 4), ((0, 2, 1), 4)])
+def test_open_edges_are_those_without_a_partner_whichever_way_it_runs(
+    order: tuple[int, int, int], count: int
+) -> None:
+    """Two triangles share a side, however the second one is turned."""
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    second = np.array([2, 1, 3])[list(order)]
+    found = close_mesh(vertices, np.array([[0, 1, 2], second]))
+    assert found.n_open == count
+    assert close_mesh(vertices, np.array([[0, 1, 2]])).n_open == 3

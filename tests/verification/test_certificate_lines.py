@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ValidationError
 
+from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.certificate_checker.program import VERSION
 from vdsm_pin.certificate_writer import lines
 from vdsm_pin.certificate_writer.lines import PER_METRE, _counted
 from vdsm_pin.certificate_writer.pieces import (
     _triangles,
     link_pieces,
+    pieces_carried,
     pieces_of_obstacles,
 )
 from vdsm_pin.certificate_writer.schema import (
@@ -111,6 +113,7 @@ def test_prisms_of_several_pieces_are_told_by_them() -> None:
         assert len(prism.pieces) == count
         told = pieces_of_obstacles([(0, prism)], pack_pieces([prism.pieces]))
         assert [*told] == (["bar"] if count > 1 else [])
+        assert [*pieces_carried([LinkBody(1, prism)])] == [*told]
         areas = [_area(prism.polygon[loop]) for loop in told.get("bar", [])]
         assert len(areas) == (count if count > 1 else 0)
         assert sum(areas) in (0.0, pytest.approx(_area(prism.polygon)))

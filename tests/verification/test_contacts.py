@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Hulls, Piece
@@ -317,3 +318,12 @@ def test_of_a_depth_what_is_lost_to_rounding_is_taken_off(one: str) -> None:
     radius, _ = common_ball(*both, point)
     assert radius > 0.0
     assert min(abs(radius - size) for size in sizes) < 1e-15
+
+
+def test_the_icosahedron_that_is_held_holds_the_ball_that_is_told() -> None:
+    """Oracle: the planes of its faces by Qhull."""
+    np.testing.assert_allclose(
+        np.linalg.norm(contacts.CORNERS, axis=1), 1.0, rtol=1e-15
+    )
+    inner = -ConvexHull(contacts.CORNERS).equations[:, 3].max()
+    assert INNER <= inner <= INNER + 0.01
