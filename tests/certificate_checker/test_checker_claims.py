@@ -18,6 +18,7 @@ from vdsm_pin.certificate_checker.balls import UP, Rejected
 from vdsm_pin.certificate_checker.claims import Clearances, Plane, clearances, tiled
 from vdsm_pin.certificate_checker.errors import reject_less
 from vdsm_pin.certificate_checker.motion import Branch, Interval, Path, Slices
+from vdsm_pin.certificate_checker.program import _unique
 from vdsm_pin.certificate_checker.solids import Body, Pair, Solid
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
 
@@ -281,3 +282,9 @@ def test_errors_are_of_what_is_asked_for_and_of_nothing_else(stated: Any) -> Non
     reject_less({"a": 1.0}, {"a": 1.0})
     with pytest.raises(Rejected, match=r"numbers of each of \['a'\] alone"):
         reject_less(stated, {"a": 1.0})
+
+
+def test_a_key_that_stands_twice_in_an_object_is_refused() -> None:
+    assert _unique([("a", 1), ("b", 1)]) == {"a": 1, "b": 1}
+    with pytest.raises(Rejected, match="a key is doubled"):
+        _unique([("a", 1), ("b", 1), ("a", 1)])

@@ -199,3 +199,22 @@ def test_a_chord_is_off_most_at_its_ends_or_at_corners_on_its_way(
         most = max(inner, off[0], off[-1])
         assert most == pytest.approx(off.max(), abs=2e-3 * scale)
         assert most >= off.max() - 1e-9
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_the_worst_deviation_is_told_in_the_interval_where_it_is(degree: int) -> None:
+    """Smooth pieces are cut for the bound; one row is 0.5 m off."""
+    rng = np.random.default_rng([8, degree])
+    for _ in range(10):
+        problem, motion = random_motion(rng, degree)
+        row = int(rng.integers(0, motion.n_samples))
+        joints = motion.joints.copy()
+        joints[row, 0] += 0.5
+        more = motion.times, motion.rates, motion.changes
+        motion = Trajectory.of_joints(joints, motion.on_path, motion.path_m, *more)
+        drawn = motion.on_path[:-1] & motion.on_path[1:]
+        if not (drawn[max(row - 1, 0) : row + 1]).any():
+            continue
+        report = check_tip(problem, motion)
+        (told,) = [each for each in report.checks if "between" in each.name]
+        assert row - 1 <= told.moment <= row
