@@ -402,13 +402,13 @@ def test_closed_parts_hang_together_by_their_corners() -> None:
     assert parts is not None and not parts.any()
 
 
-@pytest.mark.parametrize(("order", "count"), [((0, 1, 2), 4), ((0, 2, 1), 4)])
+@pytest.mark.parametrize("order", [(0, 1, 2), (0, 2, 1)])
 def test_open_edges_are_those_without_a_partner_whichever_way_it_runs(
-    order: tuple[int, int, int], count: int
+    order: tuple[int, int, int],
 ) -> None:
     """Two triangles share a side, however the second one is turned."""
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     second = np.array([2, 1, 3])[list(order)]
     found = close_mesh(vertices, np.array([[0, 1, 2], second]))
-    assert found.n_open == count
+    assert found.n_open == 4
     assert close_mesh(vertices, np.array([[0, 1, 2]])).n_open == 3

@@ -157,3 +157,6 @@ def test_of_a_motion_alone_no_more_is_found_out_than_is_asked() -> None:
     assert found.not_done == ()
     (row,) = (row for row in found.checks if "Coal" in row.name)
     assert row.where.endswith(f"; {row.count} of 1540 pairs measured")
+    told: list[object] = []
+    whole = verify(made_up.problem(), made_up.trajectory(20), sinks=(told.append,))
+    assert told and whole.not_done == ()
