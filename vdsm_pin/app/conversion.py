@@ -11,7 +11,7 @@ from vdsm_pin.app.arm_subject import CABLES, CENTRES
 from vdsm_pin.app.workflow import TRAJECTORY
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.bags import is_bag, read_bag, write_bag
+from vdsm_pin.io.bags import check_topic, is_bag, read_bag, write_bag
 from vdsm_pin.io.trajectory_file import joint_names, read_trajectory, write_trajectory
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory, text_of
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
@@ -65,9 +65,7 @@ class MotionFile:
         Raises:
             InvalidFile: If it breaks its contract or no posture of the arm fits it.
         """
-        if self.topic is not None and not is_bag(self.file):
-            wrong = f"is no bag, so topic {self.topic!r} has no meaning"
-            raise InvalidFile(file=self.file, problem=wrong)
+        check_topic(self.file, self.topic)
         if self.centres is not None:
             return read_centres(self.centres, problem)
         if self.cables is not None:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.places import Place
 from vdsm_pin.io.source import naming_file
 from vdsm_pin.io.trajectory_messages import message_of, of_message
@@ -45,6 +45,17 @@ RECORD, CHUNK = 9, 6
 def is_bag(file: Path) -> bool:
     """Whether a path names a bag: by its ending, or a folder with a metadata.yaml."""
     return file.suffix.lower() in ENDINGS or (file / "metadata.yaml").is_file()
+
+
+def check_topic(file: Path, topic: str | None) -> None:
+    """Refuse the topic of what is no bag.
+
+    Raises:
+        InvalidFile: If one is named.
+    """
+    if topic is not None and not is_bag(file):
+        problem = f"is no bag, so topic {topic!r} has no meaning"
+        raise InvalidFile(file=file, problem=problem)
 
 
 def read_bag(file: Path, topic: str | None = None) -> JointTrajectory:

@@ -9,7 +9,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.bags import is_bag, read_bag
+from vdsm_pin.io.bags import check_topic, is_bag, read_bag
 from vdsm_pin.io.source import check_is_file
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
@@ -43,9 +43,7 @@ def read_motion(
             or a value is no number or in another unit than stated.
     """
     values = values or {}
-    if topic is not None and not is_bag(file):
-        problem = f"is no bag, so topic {topic!r} has no meaning"
-        raise InvalidFile(file=file, problem=problem)
+    check_topic(file, topic)
     if is_bag(file):
         whole = read_bag(file, topic)
     else:

@@ -94,11 +94,9 @@ def _checks(found: Refinement, row: int) -> Part:
     arm, rows = CoalArm(problem, links=False), []
     for seen in arm.near(one, np.inf):
         for k, (pair, low) in enumerate(zip(seen.pair, seen.lower, strict=True)):
-            bounds = at_least(float(low)), at_most(float(seen.upper[k]))
-            proved = [bound.removesuffix(" mm") for bound in bounds]
+            proved = at_least(float(low)), at_most(float(seen.upper[k]))
             rows.append((*arm.pairs.named(pair), mm(seen.distance[k]), *proved))
-    head = ("link", "obstacle", "by Coal [mm]", "proved at least [mm]",
-            "proved at most [mm]")  # fmt: skip
+    head = ("link", "obstacle", "by Coal [mm]", "proved at least", "proved at most")
     return Part(
         "Checked",
         "section 6.3, Eq. 22–24",
