@@ -42,13 +42,20 @@ def clear_line(
     count = FEWEST
     while count * problem.planned_row_change < turn[1:].max():
         count *= 2
+    own = problem.own_pairs
+    turns = own.levers @ (turn[1::2] + turn[2::2])
     while count <= MOST:
         share = np.arange(count + 1)[:, None] / count
         rows = (1.0 - share) * begin + share * end
         clearances = clearance(row_centres(arm, rows)).min(axis=1, initial=np.inf)
-        if not (clearances >= need).all():
+        spare = own.spare(rows[:, 1::2], rows[:, 2::2])
+        if not ((clearances >= need).all() and (spare >= 0.0).all()):
             return None
-        if (clearances[:-1] + clearances[1:] - way / count >= 2.0 * need).all():
+        apart = (spare[:-1] + spare[1:] >= turns / count).all()
+        if (
+            apart
+            and (clearances[:-1] + clearances[1:] - way / count >= 2.0 * need).all()
+        ):
             return np.asarray(rows)
         count *= 2
     return None

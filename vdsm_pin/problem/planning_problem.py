@@ -26,6 +26,7 @@ from vdsm_pin.units import MM_PER_M, in_mm
 
 if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
     from vdsm_pin.geometry.pieces import PackedPieces
+    from vdsm_pin.problem.own_pairs import OwnPairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +174,13 @@ class PlanningProblem(AnyProblem, ByValue):
     def held(self) -> HeldApart:
         """What of the arm is held apart from each obstacle."""
         return HeldApart.of(self.manipulator, self.scene.names)
+
+    @cached_property
+    def own_pairs(self) -> "OwnPairs":
+        """Which bodies of the arm can come too near to each other."""
+        from vdsm_pin.problem.own_pairs import OwnPairs
+
+        return OwnPairs.of(self)
 
     @property
     def slides(self) -> bool:

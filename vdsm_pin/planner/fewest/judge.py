@@ -15,6 +15,7 @@ from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.interval_parts import LONG_TRAVEL, Parts, parts_of_pieces
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
+from vdsm_pin.planner.fewest.own_clearance import OwnClearance
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -127,6 +128,7 @@ class Judge:
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
         self.limit = ease * link_limit(problem)
+        self.own = OwnClearance(problem, slack)
         self.cone = _cone(problem, slack)
 
     def lines(self, corners: Corners, intervals: IntArray) -> Intervals:
@@ -164,8 +166,11 @@ class Judge:
         if aims is not None:
             clearances[~self._aimed(centres, aims)] = -np.inf
         angles = bends_of(centres)
+        least = clearances.min(axis=1)
+        lacks = self.own.lacking(centres, angles)
+        least = np.where(lacks > 0.0, np.minimum(least, self.required - lacks), least)
         changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
-        return Looks(clearances.min(axis=1), changed, angles.max(axis=1))
+        return Looks(least, changed, angles.max(axis=1))
 
     def _aimed(self, centres: FloatArray, aims: FloatArray) -> BoolArray:
         """Whether last links look where they shall, shape (n,)."""
@@ -276,7 +281,10 @@ class Judge:
         )
         begin = r0.min(axis=1)
         good = (begin >= need - tol) & (r1.min(axis=1) >= need - tol)
-        good &= self._within(intervals, c0, c1, most)
+        bends = np.maximum(bends_of(c0), bends_of(c1))
+        good &= self._within(intervals, (c0, c1), bends, most)
+        lacks = np.where(good, (self.required - need).clip(0.0), np.inf)
+        good &= self.own.apart(intervals, (c0, c1), bends, lacks)
         parts = Parts(number, low, high, c0, c1, r0, r1)
         for _ in range(CUTS):
             counts = parts_of_pieces(parts, knees, need, self.finest, long_way)
@@ -297,7 +305,11 @@ class Judge:
         return good, begin
 
     def _within(
-        self, intervals: Intervals, begin: FloatArray, end: FloatArray, most: FloatArray
+        self,
+        intervals: Intervals,
+        ends: tuple[FloatArray, FloatArray],
+        bends: FloatArray,
+        most: FloatArray,
     ) -> BoolArray:
         """Whether intervals whose ends keep rail and cone keep them in between.
 
@@ -306,20 +318,19 @@ class Judge:
 
         Args:
             intervals: Straight lines in the chart.
-            begin: Joint centres where they begin, shape (n, N + 1, 3); [m].
-            end: Joint centres where they end; [m].
+            ends: Joint centres where they begin and end, shape (n, N + 1, 3); [m].
+            bends: The larger link angles of both, shape (n, N); [rad].
             most: Largest link angle in each interval, shape (n,); [rad].
 
         Returns:
             Shape (n,).
         """
         arm, kept = self.problem.manipulator, np.ones(len(most), dtype=np.bool_)
-        peak = np.maximum(bends_of(begin).max(axis=1), bends_of(end).max(axis=1))
-        near = np.flatnonzero(peak > NEAR_LIMIT * most)
+        near = np.flatnonzero(bends.max(axis=1) > NEAR_LIMIT * most)
         if near.size:
             kept[near] = self._most_bent(intervals, near, most[near])
         kept &= self._looking(intervals)
-        ahead = np.minimum(begin[:, -1, 0], end[:, -1, 0])
+        ahead = np.minimum(ends[0][:, -1, 0], ends[1][:, -1, 0])
         near = np.flatnonzero(kept & (ahead - arm.total_length < arm.base_range[0]))
         if near.size:
             kept[near] = self._farthest_back(intervals, near) >= arm.base_range[0]

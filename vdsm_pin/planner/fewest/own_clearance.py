@@ -1,0 +1,117 @@
+"""Whether an arm's own bodies keep off each other in a motion in the chart.
+
+Most arms have no bodies that can meet unless the arm turns far
+(`problem/own_pairs.py`): postures that turn less are not looked at.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from vdsm_pin.arm.kinematics import joint_angles
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+
+CUTS: Final = 10
+"""Times an interval is halved; what is not known to be apart then counts as too near.
+"""
+SWELL: Final = 1.1
+"""An arm may turn farther within an interval than at its ends, over these; [-]."""
+
+
+class _Place(NamedTuple):
+    """Joint angles [rad] and what pairs have beyond what they keep, (r, p); [m]."""
+
+    alpha: FloatArray
+    theta: FloatArray
+    spare: FloatArray
+
+    def take(self, chosen: BoolArray | IntArray) -> "_Place":
+        return _Place._make(values[chosen] for values in self)
+
+
+class OwnClearance:
+    """Looks at bodies of one arm that can come too near to each other.
+
+    Args:
+        problem: The arm.
+        slack: Kept for what happens between two rows; where the straight arm has less
+            than twice that to spare, half of what it has; [m].
+    """
+
+    def __init__(self, problem: PlanningProblem, slack: float) -> None:
+        self.arm, self.pairs = problem.manipulator, problem.own_pairs
+        self.turn, straight = self.pairs.turn, np.zeros((1, self.arm.n_links))
+        if self.turn < np.inf:
+            self.reserve = (self.pairs.spare(straight, straight)[0] / 2.0).clip(
+                0.0, slack
+            )
+
+    def lacking(self, centres: FloatArray, bends: FloatArray) -> FloatArray:
+        """What postures lack of what their own bodies keep, shape (n,); [m].
+
+        Args:
+            centres: Joint centres, shape (n, N + 1, 3), NaN where a link is too short.
+            bends: Link angles, shape (n, N), NaN there; [rad].
+        """
+        lacks = np.zeros(len(centres))
+        near = np.flatnonzero(bends.sum(axis=1) >= self.turn)
+        if near.size:
+            lacks[near] = -self._at(centres[near]).spare.min(axis=1)
+        return lacks.clip(0.0)
+
+    def apart(
+        self,
+        intervals: Intervals,
+        ends: tuple[FloatArray, FloatArray],
+        bends: FloatArray,
+        allowed: FloatArray,
+    ) -> BoolArray:
+        """Which intervals keep own bodies apart all the way, shape (n,).
+
+        Args:
+            intervals: Straight lines in the chart.
+            ends: Joint centres where they begin and end, shape (n, N + 1, 3); [m].
+            bends: The larger link angles of both ends, shape (n, N); [rad].
+            allowed: What may lack, inf for anything, shape (n,); [m].
+        """
+        kept = np.ones(len(allowed), dtype=np.bool_)
+        turned = SWELL * bends.sum(axis=1) >= self.turn
+        number = np.flatnonzero(turned & np.isfinite(allowed))
+        if not number.size:
+            return kept
+        low, high = np.zeros(len(number)), np.ones(len(number))
+        begin, end = (self._at(centres[number]) for centres in ends)
+        least = -allowed[:, None] - TOLERANCES.on_boundary
+        for _ in range(CUTS):
+            need = least[number]
+            near = ((begin.spare < need) | (end.spare < need)).any(axis=1)
+            kept[number[near]] = False
+            way = np.abs(end.alpha - begin.alpha) + np.abs(end.theta - begin.theta)
+            sure = begin.spare + end.spare >= way @ self.pairs.levers.T + 2.0 * need
+            open_ = kept[number] & ~sure.all(axis=1)
+            if not open_.any():
+                return kept
+            number, low, high = number[open_], low[open_], high[open_]
+            begin, end, middle = begin.take(open_), end.take(open_), (low + high) / 2.0
+            inner = self._at(intervals.centres(self.arm, number, middle))
+            number, low = np.tile(number, 2), np.append(low, middle)
+            high = np.append(middle, high)
+            begin, end = (
+                _Place._make(np.concatenate(both) for both in zip(*two, strict=True))
+                for two in ((begin, inner), (inner, end))
+            )
+        kept[number] = False
+        return kept
+
+    def _at(self, centres: FloatArray) -> _Place:
+        """Postures, as bodies see them; one that is no arm lacks everything."""
+        spare = np.full((len(centres), len(self.reserve)), -np.inf)
+        angles = np.zeros((2, len(centres), self.arm.n_links))
+        real = np.isfinite(centres).all(axis=(1, 2))
+        if real.any():
+            angles[:, real] = joint_angles(self.arm, centres[real])
+            spare[real] = self.pairs.spare(*angles[:, real]) - self.reserve
+        return _Place(angles[0], angles[1], spare)
