@@ -135,6 +135,24 @@ def test_wrong_usage_is_status_2(vdsm: Shell, words: list[str]) -> None:
     assert "Traceback" not in ran.err
 
 
+def test_a_folder_of_packages_that_is_missing_is_refused(
+    vdsm: Shell, tmp_path: Path
+) -> None:
+    place = tmp_path / "nowhere"
+    words = ["verify", "--urdf", "a.urdf", "--trajectory", "a.csv", "--out", "a"]
+    result = vdsm(*words, "--package-dir", place)
+    assert (result.status, "does not exist" in result.err) == (2, True)
+
+
+def test_a_batch_without_a_folder_goes_to_out(
+    vdsm: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = vdsm("batch", "paper/free")
+    assert (result.status, "see out/index.html" in result.out) == (0, True)
+    assert (tmp_path / "out" / "index.html").exists()
+
+
 def test_an_arm_is_converted_both_ways(
     vdsm: Shell, planned: Path, tmp_path: Path
 ) -> None:

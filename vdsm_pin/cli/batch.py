@@ -1,5 +1,6 @@
 """`vdsm batch`."""
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -33,7 +34,7 @@ commands = family()
 )
 @grouped
 def batch(
-    out: OutFolder,
+    out: OutFolder = Path("out"),
     *,
     problems: Annotated[
         list[str] | None,

@@ -38,7 +38,12 @@ SceneFile = Annotated[
 ]
 PackageDirs = Annotated[
     list[Path] | None,
-    typer.Option(metavar="FOLDER", help="Where package:// is looked for."),
+    typer.Option(
+        metavar="FOLDER",
+        exists=True,
+        file_okay=False,
+        help="Where package:// is looked for.",
+    ),
 ]
 Locks = Annotated[
     list[str] | None,

@@ -142,7 +142,7 @@ class PlanningProblem(AnyProblem, ByValue):
                 raise UnknownName(kind="obstacle", name=one.name, known=known)
         found, expected = len(errors.joints), self.manipulator.n_links
         if found not in (0, expected):
-            message = f"errors of {found} joints, expected {expected}"
+            message = f"joint errors are {found} numbers, expected 1 or {expected}"
             raise InvalidInput(message)
         errors.angles(expected)
 
