@@ -96,6 +96,18 @@ def test_the_problem_beside_the_motions_is_no_motion(
 
 
 @pytest.mark.usefixtures("in_this_process")
+def test_a_problem_of_a_folder_of_its_own_is_named_after_that(folder: Path) -> None:
+    """As `vdsm new` makes them; each page leads back to that of the batch."""
+    (folder / "problem.yaml").write_text(PROBLEM)
+    given = (str(folder / "problem.yaml"),), (str(folder / "plans" / "clear.csv"),)
+    batch = Batch(given[0], folder / "out", FEWEST, quiet=True, trajectories=given[1])
+    (row,) = run_batch(batch)
+    assert row.folder == f"{folder.name}-clear"
+    page = (folder / "out" / row.folder / "report.html").read_text()
+    assert 'href="../index.html"' in page
+    assert f'href="{row.folder}/report.html"' in (folder / "out/index.html").read_text()
+
+
 def test_endings_may_be_large(folder: Path) -> None:
     for path in (folder / "plans").iterdir():
         path.rename(path.with_suffix(".CSV"))

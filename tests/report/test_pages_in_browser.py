@@ -244,6 +244,38 @@ def test_keys_turn_the_scene_and_come_nearer(report: Watched) -> None:
     assert report.errors == []
 
 
+def test_a_question_mark_lists_the_keys(report: Watched) -> None:
+    page = report.page
+    page.evaluate("document.activeElement.blur()")
+    assert not page.locator("#keys").is_visible()
+    page.keyboard.press("?")
+    told = page.locator("#keys").inner_text()
+    assert {"Space", "?"} < set(told.split())
+    page.locator("[data-keys]").click()
+    assert not page.locator("#keys").is_visible()
+    page.locator("[data-look=top]").focus()  # a button has keys of its own
+    page.keyboard.press("?")
+    assert page.locator("#keys").is_visible()
+    page.keyboard.press("?")
+    page.locator("[data-look=overview]").click()
+
+
+def test_words_about_a_transparent_arm_fit_a_narrow_picture(report: Watched) -> None:
+    """Oracle: the canvas measures each line."""
+    words = "transparent: with joint errors within the error box"
+    page, fits = (
+        report.page,
+        "([words, most]) => vdsm.view.overlay.wrapped(words, most)",
+    )
+    for most in (900, 150, 60):
+        lines = page.evaluate(fits, [words, most])
+        assert " ".join(lines) == words
+        measure = "one => vdsm.view.overlay.pen.measureText(one).width"
+        wide = [one for one in lines if page.evaluate(measure, one) > most]
+        assert all(" " not in one for one in wide)
+    assert page.evaluate(fits, [words, 900]) == [words]
+
+
 def test_every_text_keeps_its_contrast(browser: Any, tmp_path: Path) -> None:
     judged = made_up.verification(Verdict.REFUTED, n=40, joint_error=math.nan)
     late = Check("late", Verdict.UNDECIDED, 1, 2.0, 1.0, "m", moment=30.0)
@@ -295,6 +327,13 @@ def test_dark_and_narrow_pages_work_and_show_what_failed(
     watched.shot("report-dark-narrow")
     width = watched.page.evaluate("document.documentElement.scrollWidth")
     assert width <= 420, "the page scrolls sideways"
+    tall = """() => [...document.querySelectorAll(".legend .name")].filter((one) =>
+      one.getBoundingClientRect().height > 60).length"""
+    assert watched.page.evaluate(tall) == 0, "a name is broken letter by letter"
+    spill = """() => [...document.querySelectorAll(".legend button")].filter((one) =>
+      one.lastChild.getBoundingClientRect().right > one.getBoundingClientRect().right)
+      .length"""
+    assert watched.page.evaluate(spill) == 0, "a value stands outside of its frame"
     cut = """name => { const told = document.querySelector("[data-clearance]");
       told.textContent = name;
       return told.getBoundingClientRect().right > window.innerWidth; }"""

@@ -81,6 +81,7 @@ class VerifyOrder:
             from run to run.
         all_pairs: Whether clearance.csv has every pair at every interval; otherwise it
             has the near pairs, and the least clearance of each other one.
+        index: Where the page of the batch is, seen from the report; empty if of none.
     """
 
     problem: ProblemOrCell
@@ -92,6 +93,7 @@ class VerifyOrder:
     options: MotionOptions = NO_OPTIONS
     all_pairs: bool = False
     date: str | None = None
+    index: str = ""
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,7 @@ def plan_to_folder(
     command: str,
     deadline: Deadline = NO_LIMIT,
     report: bool = True,
+    index: str = "",
 ) -> PlanFile:
     """Plan, and write trajectory.csv, centres.csv, cables.csv, plan.json, report.html.
 
@@ -130,6 +133,7 @@ def plan_to_folder(
         deadline: When to give up.
         report: Whether to write report.html; a caller that verifies next writes a
             fuller one.
+        index: Where the page of the batch is, seen from the folder; empty if of none.
 
     Raises:
         UnknownName: If there is no such strategy.
@@ -152,7 +156,9 @@ def plan_to_folder(
             refinement = plan_and_verify(problem, strategy, deadline=deadline)
         except (Infeasible, OutOfTime) as error:
             with staged(folder) as staging:
-                write_no_plan(staging / NO_PLAN, problem, error, strategy, record)
+                write_no_plan(
+                    staging / NO_PLAN, problem, error, strategy, record, index
+                )
             error.page = folder / NO_PLAN
             raise
     plan = refinement.plan
@@ -255,7 +261,8 @@ def verify_into(order: VerifyOrder, given: Given, staging: Path) -> Verified:
     record = RunRecord.of(order.command, source, urdf, digest, order.date)
     file = verification_file(verification, record)
     (staging / VERIFICATION).write_text(file.text(), encoding="utf-8")
-    write_report(staging / REPORT, verification, file, planned_by(order.trajectory))
+    plan = planned_by(order.trajectory)
+    write_report(staging / REPORT, verification, file, plan, order.index)
     # Last inside: a certificate that cannot be written leaves no half of a result.
     missing = _certify(order, subject, verification, record)
     return Verified(file, verification, missing)

@@ -145,12 +145,17 @@ def folder_names(
 
 
 def _plain_name(problem: str) -> str:
-    path = Path(problem)
-    stem = path.stem if path.suffix.lower() in (".yaml", ".yml") else problem.strip("/")
-    if stem == NEW and path.parent.name:  # as vdsm new makes them: FOLDER/problem.yaml
-        stem = path.parent.name
+    stem = _stem(problem)
     kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in stem).strip(".-")
     return kept.encode()[:LONGEST_NAME].decode(errors="ignore") or "problem"
+
+
+def _stem(problem: str) -> str:
+    path = Path(problem)
+    if path.stem == NEW and path.parent.name:  # as vdsm new makes: FOLDER/problem.yaml
+        return path.parent.name
+    named = path.suffix.lower() in (".yaml", ".yml")
+    return path.stem if named else problem.strip("/")
 
 
 def _hash(problem: str) -> str:
@@ -173,4 +178,6 @@ def jobs_by_name(
 
 
 def _stems(job: tuple[str, str | None]) -> str:
-    return "-".join(Path(name).stem for name in job if name is not None)
+    problem, motion = job
+    stem = _stem(problem)
+    return stem if motion is None else f"{stem}-{Path(motion).stem}"

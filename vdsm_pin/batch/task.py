@@ -18,6 +18,9 @@ MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"
 """Seconds of one problem; the only file that differs from run to run."""
 
+INDEX: Final = "../index.html"
+"""The page of the batch, seen from a problem's folder."""
+
 PICTURE: Final = "picture.svg"
 CERTIFICATE: Final = "certificate.jsonl"
 PDF: Final = "report.pdf"

@@ -18,6 +18,7 @@ from vdsm_pin.app.workflow import (
 from vdsm_pin.batch.folders import finished, write_manifest
 from vdsm_pin.batch.task import (
     CERTIFICATE,
+    INDEX,
     PDF,
     PICTURE,
     TIMING,
@@ -121,7 +122,13 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
     if task.trajectory is None:
         assert isinstance(problem, PlanningProblem)
         plan = plan_to_folder(
-            problem, task.strategy, task.staging, task.command, deadline, report=False
+            problem,
+            task.strategy,
+            task.staging,
+            task.command,
+            deadline,
+            report=False,
+            index=INDEX,
         )
         if problem.scene.obstacles:  # without any, little is compiled
             note_planned()
@@ -133,6 +140,7 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
         certificate=task.staging / CERTIFICATE if asked.certificate else None,
         pdf=task.staging / PDF if asked.pdf else None,
         options=MotionOptions(deadline),
+        index=INDEX,
     )
     verified = verify_to_folder(order)
     certified = verified.records.verdict is Verdict.CERTIFIED

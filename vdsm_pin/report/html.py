@@ -154,6 +154,7 @@ def write_report(
     verification: Verification,
     file: VerificationFile,
     plan: PlanFile | None = None,
+    index: str = "",
 ) -> None:
     """report.html of one verification.
 
@@ -162,6 +163,7 @@ def write_report(
         verification: The records, for the plots and the scene.
         file: The same as words and rows.
         plan: How the trajectory was planned, where that is known.
+        index: Where the page of the batch is that it belongs to; empty if to none.
     """
     data, arm = report_data(verification), None
     if isinstance(verification, ArmVerification):
@@ -183,6 +185,7 @@ def write_report(
         first_bad=next((finite(one.moment) for one in failing(verification)), None),
         left_out=left_out_words(file.left_out),
         held=any(pair.obstacle for pair in verification.pairs),
+        index=index,
     )
     path.write_text(page, encoding="utf-8")
 
@@ -221,6 +224,7 @@ def write_no_plan(
     error: VdsmError,
     strategy: str,
     record: RunRecord,
+    index: str = "",
 ) -> None:
     """The page of a search that ended without a plan: why, how far it came, the arm.
 
@@ -230,6 +234,7 @@ def write_no_plan(
         error: What ended the search.
         strategy: Name of the strategy.
         record: The run.
+        index: Where the page of the batch is that it belongs to; empty if to none.
     """
     place = impasse_of(problem, error)
     page = rendered(
@@ -244,6 +249,7 @@ def write_no_plan(
         versions=versions(),
         machine=machine(),
         data=impasse_data(problem, place),
+        index=index,
         most_drawn=MOST_DRAWN,
     )
     path.write_text(page, encoding="utf-8")

@@ -15,6 +15,7 @@ function bindControls(motion, clearances) {
   speed.addEventListener("change", () => (motion.speed = Number(speed.value)));
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.key === "?") return toggleKeys();
     const own = "button, a, summary, select, [type=checkbox], [type=range]:not([data-slider])";
     if (event.target.closest(own)) return; // these keys are theirs
     if (event.key === " ") motion.play(!motion.playing);
@@ -23,12 +24,20 @@ function bindControls(motion, clearances) {
     else return;
     event.preventDefault();
   });
+  document.querySelector("[data-keys]").addEventListener("click", toggleKeys);
   bindReadout(motion, slider, clearances);
   motion.listen((time) => {
     slider.value = time;
     button.textContent = motion.playing ? "❚❚ Pause" : "▶ Play";
     button.setAttribute("aria-pressed", String(motion.playing));
   });
+}
+
+// Show what keys do, or hide it.
+function toggleKeys() {
+  const list = document.getElementById("keys");
+  list.hidden = !list.hidden;
+  document.querySelector("[data-keys]").setAttribute("aria-expanded", String(!list.hidden));
 }
 
 // Where the motion is, and what clearance is proved there.

@@ -131,9 +131,22 @@ class Overlay {
   }
 
   // What the transparent arm is, in lines above the scale.
-  caption(lines) {
+  caption(told) {
+    const lines = told.flatMap((words) => this.wrapped(words, this.width - 32));
     lines.forEach((words, k) =>
-      this.text(words, 16, this.height - 84 - 18 * (lines.length - 1 - k), this.red));
+      this.text(words, 16, this.height - 92 - 18 * (lines.length - 1 - k), this.red));
+  }
+
+  // Words in lines of at most so many pixels.
+  wrapped(words, most) {
+    this.pen.font = FONT;
+    const lines = [];
+    for (const word of words.split(" ")) {
+      const longer = lines.length ? `${lines[lines.length - 1]} ${word}` : word;
+      if (lines.length && this.pen.measureText(longer).width <= most) lines[lines.length - 1] = longer;
+      else lines.push(word);
+    }
+    return lines;
   }
 
   // The gap between the two witness points, as on a drawing.

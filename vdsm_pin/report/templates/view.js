@@ -331,7 +331,7 @@ function makeView(pane, scene, motion) {
     const canvas = pane.querySelector("canvas");
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label",
-      "The motion in its scene, in 3D: arrow keys turn it, plus and minus come nearer and go back");
+      "The motion in its scene, in 3D: arrow keys turn it, plus and minus come nearer and go back, ? lists the keys");
     canvas.tabIndex = 0;
     canvas.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.altKey || event.metaKey) return;
