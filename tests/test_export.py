@@ -131,7 +131,7 @@ def test_a_motion_plays_evenly_by_what_moves_most_and_by_its_own_times() -> None
         (["--out", "a.png", "--look", "below"], "expected one of overview"),
         (["--out", "a.png", "--moment", "3"], "a waypoint from 0 to 0"),
         (["--out", "a.mp4"], "an MP4 needs ffmpeg: 'nothing' is not installed"),
-        (["--out", "near.yaml"], "ends in none of"),
+        (["--out", "near.yaml"], "is an input, read as near.yaml"),
         (["--out", "a.glb", "--moment", "3"], "--moment has no meaning with .glb"),
         (["--out", "a.glb", "--moment", "0"], "--moment has no meaning with .glb"),
         (["--out", "a.GLB", "--look", "side"], "--look has no meaning with .glb"),

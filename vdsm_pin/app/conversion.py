@@ -18,7 +18,7 @@ from vdsm_pin.io.waypoint_tables import read_cables, read_centres
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.report.folder import check_outputs, staged
 from vdsm_pin.report.tables import write_cables, write_centres
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.trajectory_csv import csv_text
@@ -95,9 +95,8 @@ def convert_to_folder(
         InvalidInput: If the file is bad or the folder cannot be written.
     """
     file = given.file
-    check_output_folder(folder)
-    outputs = [folder / name for name in (*CONVERTED, *map(message_name, also))]
-    check_kept(outputs, [*problem.files, file])
+    names = (*CONVERTED, *map(message_name, also))
+    check_outputs([*problem.files, file], folder=folder, names=names)
     motion = given.read(problem)
     with staged(folder) as staging:
         write_trajectory(staging / TRAJECTORY, motion)
@@ -125,9 +124,8 @@ def convert_robot(
         InvalidInput: If the file is bad or the folder cannot be written.
     """
     file = given.file
-    check_output_folder(folder)
     names = (TRAJECTORY, *map(message_name, also))
-    check_kept([folder / name for name in names], [*cell.files, file])
+    check_outputs([*cell.files, file], folder=folder, names=names)
     robot = cell.robot
     motion = read_motion(file, robot.joints, given.topic, robot.values)
     with staged(folder) as staging:

@@ -12,7 +12,7 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.atomic import atomic_path, write_bytes
 from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.film import FRAMES_PER_SECOND, Shot, encode, find_encoder, pictures
-from vdsm_pin.report.folder import check_ending, check_kept, check_output_file
+from vdsm_pin.report.folder import check_outputs
 from vdsm_pin.report.gltf import glb, play_times
 from vdsm_pin.report.html import view_page
 
@@ -67,12 +67,10 @@ def export(order: ExportOrder) -> None:
 
 def _check(order: ExportOrder) -> None:
     """Refuse what cannot be done before any work is."""
-    check_output_file(order.out)
-    check_ending(order.out, *ENDINGS)
+    motion = () if order.trajectory is None else (order.trajectory,)
+    check_outputs((*order.problem.files, *motion), files=[(order.out, ENDINGS)])
     if order.out.suffix.lower() == ".mp4":
         find_encoder()
-    motion = () if order.trajectory is None else (order.trajectory,)
-    check_kept([order.out], [*order.problem.files, *motion])
 
 
 def _within(moment: float, shown: Drawing) -> float:

@@ -19,7 +19,7 @@ from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.source import check_unchanged, sha256_of_file
 from vdsm_pin.repair.rounds import Repaired
 from vdsm_pin.report.files import VerificationFile
-from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.report.folder import check_outputs, staged
 from vdsm_pin.verification.records import Verdict, Verification
 
 REPAIR: Final = "repair.json"
@@ -47,8 +47,7 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Repair
             found is not certified as it was written, as where the time is over.
     """
     inputs = [*order.problem.files, order.trajectory]
-    check_output_folder(order.folder)
-    check_kept([order.folder / n for n in (TRAJECTORY, REPAIR, *JUDGED)], inputs)
+    check_outputs(inputs, folder=order.folder, names=(TRAJECTORY, REPAIR, *JUDGED))
     motion, digest, subject = read_given(order)
     with naming_earlier(order.folder / VERIFICATION):
         found = subject.repair(motion, pinned)

@@ -103,7 +103,8 @@ def stated_cell(
         InvalidInput: If the file cannot be written, or is one that is read.
     """
     path = problem_beside(certificate)
-    check_outputs((certificate, path), CERTIFICATES, (*cell.files, motion))
+    outputs = (certificate, CERTIFICATES), (path, (".yaml",))
+    check_outputs((*cell.files, motion), files=outputs)
     text = problem_text(cell, files, scene, path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -46,7 +46,7 @@ def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
     """
     asked = read_problem_or_cell(problem)
     motion = () if trajectory is None else (trajectory,)
-    check_outputs((path,), (".html", ".htm"), (*asked.files, *motion))
+    check_outputs((*asked.files, *motion), files=[(path, (".html", ".htm"))])
     write_text(path, view_page(drawing(asked, trajectory)))
 
 

@@ -34,10 +34,7 @@ from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.film import find_browser, print_page
 from vdsm_pin.report.folder import (
     CERTIFICATES,
-    check_ending,
-    check_kept,
-    check_output_file,
-    check_output_folder,
+    check_outputs,
     staged,
 )
 from vdsm_pin.report.run_record import RunRecord, now
@@ -146,8 +143,7 @@ def plan_to_folder(
     from vdsm_pin.report.html import write_no_plan, write_report
 
     _check_plannable(problem)
-    check_output_folder(folder)
-    check_kept([folder / name for name in PLANNED], problem.files)
+    check_outputs(problem.files, folder=folder, names=PLANNED)
     model = load_arm(problem.manipulator)
     date = now() if report else None
     record = RunRecord.of(command, problem.source, model.urdf_sha256, date=date)
@@ -270,17 +266,11 @@ def verify_into(order: VerifyOrder, given: Given, staging: Path) -> Verified:
 
 def _check_outputs(order: VerifyOrder) -> None:
     """Refuse what cannot be written before any work is done."""
-    check_output_folder(order.folder)
-    alone = [file for file in (order.certificate, order.pdf) if file is not None]
-    for file in alone:
-        check_output_file(file)
-    outputs = [*(order.folder / name for name in JUDGED), *alone]
-    beside = order.trajectory.parent / PLAN
-    check_kept(outputs, [*order.problem.files, order.trajectory, beside])
-    if order.certificate is not None:
-        check_ending(order.certificate, *CERTIFICATES)
+    alone = (order.certificate, CERTIFICATES), (order.pdf, (".pdf",))
+    files = [(file, endings) for file, endings in alone if file is not None]
+    inputs = *order.problem.files, order.trajectory, order.trajectory.parent / PLAN
+    check_outputs(inputs, folder=order.folder, names=JUDGED, files=files)
     if order.pdf is not None:
-        check_ending(order.pdf, ".pdf")
         find_browser()
 
 

@@ -40,7 +40,7 @@ from vdsm_pin.io.source import read_text
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.report.files import BatchRow, TimingFile
 from vdsm_pin.report.film import find_browser
-from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.report.folder import check_outputs, staged
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.summaries import (
     COLUMNS,
@@ -107,7 +107,6 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
     strategy(batch.settings.strategy)
     if batch.settings.pdf:
         find_browser()
-    check_output_folder(batch.folder)
     tasks = _tasks(batch)
     batch.folder.mkdir(parents=True, exist_ok=True)
     with writing(batch.folder), _locked(batch.folder), _stoppable() as stop:
@@ -169,8 +168,9 @@ def _tasks(batch: Batch) -> list[Task]:
     jobs = jobs_by_name(problems, given)
     names = folder_names(tuple(jobs), OWN)
     _check_own(batch.folder)
-    files = [batch.folder / name for name in OWN if name != _STAGING]
-    check_kept(files, map(Path, (*problems, *filter(None, given))))
+    files = [name for name in OWN if name != _STAGING]
+    inputs = map(Path, (*problems, *filter(None, given)))
+    check_outputs(inputs, folder=batch.folder, names=files)
     tasks = []
     for job, name in names.items():
         problem, motion = jobs[job]

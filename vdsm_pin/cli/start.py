@@ -161,7 +161,8 @@ def urdf(
         for body, file in mesh_names(arm).items()
     }
     read = () if problem is None else problem.files
-    check_outputs((out, *files), (".urdf", ".xml"), read)
+    outputs = (out, (".urdf", ".xml")), *((file, (file.suffix,)) for file in files)
+    check_outputs(read, files=outputs)
     for file, content in {**files, out: text}.items():
         with atomic_path(file) as path:
             path.write_text(content, encoding="utf-8")

@@ -63,13 +63,36 @@ def check_output_file(path: Path) -> None:
 
 
 def check_outputs(
-    outputs: Sequence[Path], endings: Sequence[str], inputs: Iterable[Path]
+    inputs: Iterable[Path],
+    *,
+    folder: Path | None = None,
+    names: Iterable[str] = (),
+    files: Sequence[tuple[Path, Sequence[str]]] = (),
 ) -> None:
-    """`check_output_file` and `check_kept` of outputs, `check_ending` of the first."""
-    for output in outputs:
-        check_output_file(output)
+    """Refuse outputs that shall not be written, before any work is done.
+
+    First those that cannot be written, then those that are an input or one another's
+    place, then those whose name is of another kind.
+
+    Args:
+        inputs: Files that are read.
+        folder: Where outputs go by their names; None for nowhere.
+        names: Of these outputs.
+        files: Others, each with the endings one of which it has.
+
+    Raises:
+        InvalidFile: If there is one; see `check_output_folder`, `check_output_file`,
+            `check_kept` and `check_ending`.
+    """
+    outputs = [file for file, _ in files]
+    if folder is not None:
+        check_output_folder(folder)
+        outputs = [*(folder / name for name in names), *outputs]
+    for file, _ in files:
+        check_output_file(file)
     check_kept(outputs, inputs)
-    check_ending(outputs[0], *endings)
+    for file, endings in files:
+        check_ending(file, *endings)
 
 
 def check_kept(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:

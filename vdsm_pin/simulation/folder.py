@@ -15,7 +15,7 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.report.folder import check_outputs, staged
 from vdsm_pin.report.rows import FileModel, VerdictWord
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.terminal import show_facts
@@ -108,14 +108,6 @@ class SimulationOrder:
     settings_file: Path | None = None
 
 
-def _check_outputs(order: SimulationOrder) -> None:
-    """Refuse what cannot be written, or would take an input's place."""
-    check_output_folder(order.folder)
-    read = [*order.problem.files, order.trajectory, order.settings_file]
-    outputs = [order.folder / name for name in (EXECUTED, RECORD, SUMMARY, PAGE)]
-    check_kept(outputs, filter(None, read))
-
-
 def _check_settings(order: SimulationOrder) -> None:
     """Refuse settings that do not fit the arm, by the name of their file."""
     try:
@@ -133,7 +125,9 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
         InvalidInput: If a file is bad or the folder cannot be written.
         VerificationFailed: If MuJoCo is missing or the simulation diverges.
     """
-    _check_outputs(order)
+    read = [*order.problem.files, order.trajectory, order.settings_file]
+    names = EXECUTED, RECORD, SUMMARY, PAGE
+    check_outputs(filter(None, read), folder=order.folder, names=names)
     problem = order.problem
     if problem.scene.moving:
         name = problem.scene.moving[0].name

@@ -12,7 +12,7 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import Refinement, plan_and_verify
-from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.report.folder import check_outputs, staged
 from vdsm_pin.report.html import rendered
 from vdsm_pin.report.words import at_least, at_most
 from vdsm_pin.verification.coal_arm import CoalArm
@@ -40,8 +40,7 @@ def explain_to_folder(
         Infeasible: If the paper's rule has no plan.
     """
     _ = problem.path  # says where there is nothing to draw
-    check_output_folder(folder)
-    check_kept([folder / PAGE], problem.files)
+    check_outputs(problem.files, folder=folder, names=[PAGE])
     if problem.scene.moving:
         name = problem.scene.moving[0].name
         message = f"obstacle {name!r} moves, which the paper's steps know nothing of"
