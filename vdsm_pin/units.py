@@ -1,6 +1,6 @@
 """Conversion between SI and what people type; for readers and writers only."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from math import ceil, degrees, floor, isfinite, isinf, isnan, log10
 from typing import Final, TypeAlias
 
@@ -62,6 +62,15 @@ def quantity(value: float | None, unit: str, whole: Whole | None = None) -> str:
     return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
 
 
+def signed(text: str) -> str:
+    """The text of a number with a minus sign, which zero has not.
+
+    >>> signed("-1.5"), signed("-0.000")
+    ('−1.5', '0.000')
+    """
+    return text.replace("-", "−" if text.strip("-0.") else "")
+
+
 def measured(value: float | None, unit: str) -> str:
     """The same of a length or an angle of the motion, where rounding noise is zero."""
     if value is None or isnan(value):
@@ -91,24 +100,33 @@ def percent_at_most(share: float) -> str:
     return f"{ceil(whole * 1000.0) / 10.0:.1f} %"
 
 
-def in_mm(length: float) -> str:
-    """A length as people read it, in messages and notes; [m] to mm."""
+def in_mm(length: float, whole: Whole | None = None) -> str:
+    """A length as people read it, in messages and notes; [m] to mm.
+
+    Args:
+        length: The length; [m].
+        whole: Rounds to 0.001 mm; to the nearest where not given.
+    """
     if not isfinite(length):
         return "-"
-    rounded = round(length * MM_PER_M, 3) + 0.0  # no -0
-    return f"{rounded:.3f} mm".replace("-", "−")
+    if whole is not None:
+        length = whole(round(length * MM_PER_M**2, _NOISE_DIGITS)) / MM_PER_M**2
+    return f"{signed(f'{length * MM_PER_M:.3f}')} mm"
 
 
 def proved_mm(length: float) -> str:
     """A length that is proved to be kept, rounded down; [m]."""
-    scaled = round(length * MM_PER_M**2, 6)  # rounding noise is nothing
-    return in_mm(floor(scaled) / MM_PER_M**2 if isfinite(scaled) else length)
+    return in_mm(length, floor)
 
 
 def at_most_mm(length: float) -> str:
     """A length that is proved not to be exceeded, rounded up; [m]."""
-    scaled = round(length * MM_PER_M**2, 6)
-    return in_mm(ceil(scaled) / MM_PER_M**2 if isfinite(scaled) else length)
+    return in_mm(length, ceil)
+
+
+def point_mm(point: Iterable[float]) -> str:
+    """Coordinates as people read them; [m] to mm."""
+    return ", ".join(signed(f"{value * MM_PER_M:.1f}") for value in point)
 
 
 def clearance_words(clearance: float, deeper: bool = False) -> str:

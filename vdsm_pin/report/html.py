@@ -45,11 +45,11 @@ from vdsm_pin.report.words import (
 )
 from vdsm_pin.units import (
     MISSING,
-    MM_PER_M,
     measured,
     measured_at_most,
     percent,
     percent_at_most,
+    point_mm,
     quantity,
 )
 from vdsm_pin.verification.records import ArmVerification, Verification
@@ -124,10 +124,7 @@ def _meshcat() -> str:
 
 def point(point: Point | None) -> str:
     """A point in mm."""
-    if point is None:
-        return MISSING
-    rounded = (round(value * MM_PER_M, 1) + 0.0 for value in point)  # -0 is 0
-    return ", ".join(f"{value:.1f}".replace("-", "−") for value in rounded)
+    return MISSING if point is None else point_mm(point)
 
 
 def sentence(text: str) -> Markup:

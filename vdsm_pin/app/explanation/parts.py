@@ -9,7 +9,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MM_PER_M, point_mm, signed
 
 SUBSCRIPTS: Final = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -88,25 +88,17 @@ def name(letter: str, number: int) -> str:
 
 def mm(value: float) -> str:
     """A length in mm, three decimals."""
-    return _number(f"{value * MM_PER_M:.3f}")
+    return signed(f"{value * MM_PER_M:.3f}")
 
 
 def deg(value: float) -> str:
     """An angle in degrees, three decimals."""
-    return _number(f"{np.rad2deg(value):.3f}")
+    return signed(f"{np.rad2deg(value):.3f}")
 
 
 def at(point: FloatArray) -> str:
     """A point in mm."""
-    inside = (_number(f"{v:.1f}") for v in np.asarray(point) * MM_PER_M)
-    return f"({', '.join(inside)})"
-
-
-def _number(text: str) -> str:
-    """The same with a minus sign, which zero has not."""
-    if not any(digit in text for digit in "123456789"):
-        return text.removeprefix("-")
-    return text.replace("-", "−")
+    return f"({point_mm(point)})"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:

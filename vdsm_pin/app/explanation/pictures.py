@@ -20,7 +20,7 @@ from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.report.html import rendered
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MM_PER_M, signed
 
 WIDTH: Final = 560.0
 MARGIN: Final = 46.0
@@ -106,7 +106,7 @@ class Canvas:
                 self.line(ends, "grid", width=0.6)
                 x, y = self._place(ends[0])
                 at = (x, y + 14, "middle") if axis == 0 else (x - 6, y + 4, "end")
-                tick = f"{k * step * MM_PER_M:.0f}".replace("-", "−")
+                tick = signed(f"{k * step * MM_PER_M:.0f}")
                 self._word(*at, tick, "tick")
             far = [[high[0], low[1]], [low[0], high[1]]][axis]
             x, y = self._place(np.array(far))
