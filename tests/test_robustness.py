@@ -75,7 +75,7 @@ def test_every_sign_can_be_seen() -> None:
     assert printable(odd) == r"a\x1b[31m\n\ud800\u202e\x7f\u200b"
     assert printable("Größe 5 µm ✓") == "Größe 5 µm ✓"
     assert len(printable("x" * 10 * LONGEST)) < LONGEST + 100
-    assert str(InvalidFile(file="a\x1b", problem="b\n")) == r"a\x1b: b\n"
+    assert str(InvalidFile(file="a\x1b", fault="b\n")) == r"a\x1b: b\n"
 
 
 def test_an_endless_line_is_not_read(tmp_path: Path) -> None:

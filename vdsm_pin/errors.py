@@ -66,18 +66,18 @@ class InvalidFile(InvalidInput):
     Args:
         file: The file as the user named it.
         where: Field or line inside the file; empty for the file as a whole.
-        problem: What is wrong and what was expected.
+        fault: What is wrong and what was expected.
 
     Attributes:
         others: What else is wrong in the file; as text the error tells how many
             there are.
     """
 
-    def __init__(self, *, file: object, where: str = "", problem: str) -> None:
-        self.file, self.where, self.problem = str(file), where, problem
+    def __init__(self, *, file: object, where: str = "", fault: str) -> None:
+        self.file, self.where, self.fault = str(file), where, fault
         self.others: tuple[InvalidFile, ...] = ()
         place = f"{file}: {where}" if where else str(file)
-        super().__init__(f"{place}: {problem}")
+        super().__init__(f"{place}: {fault}")
 
     def __str__(self) -> str:
         """The message, and how many more there are."""
@@ -94,7 +94,7 @@ class CannotWrite(InvalidFile):
 
     def __init__(self, *, file: object, reason: str) -> None:
         self.reason = reason
-        super().__init__(file=file, problem=f"cannot be written: {reason}")
+        super().__init__(file=file, fault=f"cannot be written: {reason}")
 
 
 class UnknownName(InvalidInput):
@@ -113,13 +113,13 @@ class InconsistentCables(InvalidInput):
     ) -> None:
         self.waypoint, self.link = waypoint, link
         self.residual, self.tolerance = residual, tolerance
-        self.problem = f"the cable lengths of link {link} fit no joint angles"
+        self.fault = f"the cable lengths of link {link} fit no joint angles"
         if math.isfinite(residual):
-            self.problem += (
+            self.fault += (
                 f"; the nearest leave {residual * MM_PER_M:.3g} mm, expected "
                 f"{tolerance * MM_PER_M:.1e} mm at most"
             )
-        message = f"waypoint {waypoint}: {self.problem}"
+        message = f"waypoint {waypoint}: {self.fault}"
         super().__init__(message)
 
 
@@ -128,11 +128,11 @@ class WrongLinkLength(InvalidInput):
 
     def __init__(self, *, waypoint: int, link: int, gap: float, length: float) -> None:
         self.waypoint, self.link, self.gap, self.length = waypoint, link, gap, length
-        self.problem = (
+        self.fault = (
             f"o{link} and o{link + 1} are {gap * MM_PER_M:.6f} mm apart, expected the "
             f"length of link {link}, {length * MM_PER_M:.6f} mm"
         )
-        super().__init__(f"waypoint {waypoint}: {self.problem}")
+        super().__init__(f"waypoint {waypoint}: {self.fault}")
 
 
 @dataclass(frozen=True, slots=True)

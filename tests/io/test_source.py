@@ -61,7 +61,7 @@ def test_an_error_names_the_file_unless_it_names_its_own() -> None:
         message = "is wrong"
         raise InvalidInput(message)
     with pytest.raises(InvalidFile, match=r"^b: is wrong$"), naming_file(Path("a")):
-        raise InvalidFile(file="b", problem="is wrong")
+        raise InvalidFile(file="b", fault="is wrong")
 
 
 def test_what_names_no_file_is_told() -> None:

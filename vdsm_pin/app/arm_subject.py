@@ -53,10 +53,8 @@ class ArmSubject:
     def read(self, file: Path) -> Trajectory:
         """Read the motion of a CSV file."""
         if is_bag(file) or file.suffix.lower() in ENDINGS:
-            problem = (
-                "is no CSV; `vdsm convert PROBLEM --trajectory FILE --out FOLDER` "
-            )
-            raise InvalidFile(file=file, problem=f"{problem}makes one of it")
+            fault = "is no CSV; `vdsm convert PROBLEM --trajectory FILE --out FOLDER` "
+            raise InvalidFile(file=file, fault=f"{fault}makes one of it")
         arm, joined = self.problem.manipulator, self.options.interpolation
         asked = self.problem.tip_path is not None
         motion = read_trajectory(file, arm, joined, places=asked)

@@ -165,18 +165,18 @@ def read_arm_message(
     names = joint_names(arm.n_links)
     missing = [name for name in names if name not in found.names]
     if missing:
-        problem = f"has no joint {missing[0]!r}"
-        raise InvalidFile(file=file, where="joint_names", problem=problem)
+        fault = f"has no joint {missing[0]!r}"
+        raise InvalidFile(file=file, where="joint_names", fault=fault)
     found = found.of(names)
     if not (np.abs(found.q[:, 1:]) <= np.pi).all():
-        problem = "has an angle beyond pi; is it in degrees? expected radians"
-        raise InvalidFile(file=file, problem=problem)
+        fault = "has an angle beyond pi; is it in degrees? expected radians"
+        raise InvalidFile(file=file, fault=fault)
     try:
         return Trajectory.of_joints(
             found.q, times=found.times, rates=found.rates, changes=found.changes
         )
     except InvalidInput as error:
-        raise InvalidFile(file=file, problem=str(error)) from None
+        raise InvalidFile(file=file, fault=str(error)) from None
 
 
 def arm_message(motion: Trajectory) -> JointTrajectory:

@@ -65,4 +65,4 @@ def check_times(file: Path, scene: Scene, motion: Motion) -> None:
         InvalidFile: If obstacles move and the motion has no times.
     """
     if why := untimed(scene, motion):
-        raise InvalidFile(file=file, where="line 1", problem=why)
+        raise InvalidFile(file=file, where="line 1", fault=why)

@@ -186,7 +186,7 @@ def _check_plannable(problem: PlanningProblem) -> None:
             "start and what the tip shall draw. Without them `vdsm verify` judges a "
             "given motion"
         )
-        raise InvalidFile(file=problem.files[0], where="tip_path", problem=need)
+        raise InvalidFile(file=problem.files[0], where="tip_path", fault=need)
 
 
 def verify_to_folder(order: VerifyOrder) -> Verified:

@@ -83,13 +83,13 @@ def validate_urdf(text: str, *, geometry_only: bool = False) -> ET.Element:
     if robot.tag != "robot":
         message = f"URDF's root element is <{robot.tag}>, expected <robot>"
         raise InvalidInput(message)
-    for problem in _problems(robot, geometry_only):
-        message = f"URDF: {problem}"
+    for fault in _faults(robot, geometry_only):
+        message = f"URDF: {fault}"
         raise InvalidInput(message)
     return robot
 
 
-def _problems(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
+def _faults(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
     for kind in ("link", "joint"):
         names = Counter(element.get("name", "") for element in robot.findall(kind))
         for name, count in names.items():
@@ -98,14 +98,14 @@ def _problems(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
             if count > 1:
                 yield f"{count} {kind}s are named {name!r}; names are unique"
     for joint in robot.findall("joint"):
-        yield from _joint_problems(joint, geometry_only)
+        yield from _joint_faults(joint, geometry_only)
     yield from _misspelt(robot, "robot")
-    yield from _tree_problems(robot)
+    yield from _tree_faults(robot)
     for link in robot.findall("link"):
-        yield from _link_problems(link, geometry_only)
+        yield from _link_faults(link, geometry_only)
 
 
-def _tree_problems(robot: ET.Element) -> Iterator[str]:
+def _tree_faults(robot: ET.Element) -> Iterator[str]:
     links = {link.get("name", "") for link in robot.findall("link")}
     if not links:
         yield (
@@ -138,7 +138,7 @@ def _tree_problems(robot: ET.Element) -> Iterator[str]:
         rooted |= seen
 
 
-def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
+def _joint_faults(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"joint {joint.get('name', '')!r}"
     kind = joint.get("type", "")
     yield from _repeated(joint, where)
@@ -146,7 +146,7 @@ def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     kinds = ANY_JOINT_KINDS if geometry_only else JOINT_KINDS
     if kind not in kinds:
         yield f"{where}: type {kind!r}, expected one of {', '.join(kinds)}"
-    yield from _origin_problems(joint, where)
+    yield from _origin_faults(joint, where)
     if kind == "fixed":
         return
     axis = None if joint.find("axis") is None else _numbers(joint, "axis", "xyz", 3)
@@ -156,7 +156,7 @@ def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
             yield f"{where}: axis {text!r} is no direction"
         elif kind == "planar" and (axis[:2].any() or not axis[2] > 0.0):
             yield f"{where}: axis {text!r}, expected 0 0 1 of a planar joint"
-    yield from _limit_problems(joint, where, optional=geometry_only)
+    yield from _limit_faults(joint, where, optional=geometry_only)
 
 
 def unknown_elements(element: ET.Element) -> list[str]:
@@ -171,7 +171,7 @@ def _misspelt(element: ET.Element, where: str) -> Iterator[str]:
             yield f"{where}: <{tag}> is not read by anybody; is <{meant[0]}> meant?"
 
 
-def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[str]:
+def _limit_faults(joint: ET.Element, where: str, optional: bool) -> Iterator[str]:
     """What is wrong with limits; `optional` ones are judged where they are given."""
     limit, kind = joint.find("limit"), joint.get("type")
     given = {} if limit is None else limit.attrib
@@ -190,15 +190,15 @@ def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[s
             yield f"{where}: limit {name} is {text!r}, expected 0 or more"
 
 
-def _link_problems(link: ET.Element, geometry_only: bool) -> Iterator[str]:
+def _link_faults(link: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"link {link.get('name', '')!r}"
     yield from _repeated(link, where)
     yield from _misspelt(link, where)
     inertial = link.find("inertial")
     if inertial is not None and not geometry_only:
         yield from _repeated(inertial, where)
-        yield from _origin_problems(inertial, where)
-        yield from _inertia_problems(inertial, where)
+        yield from _origin_faults(inertial, where)
+        yield from _inertia_faults(inertial, where)
     shown = [] if geometry_only else link.findall("visual")
     sizes = ANY_SIZES if geometry_only else SIZES
     tags = [one.tag.rpartition("}")[2].lower() for one in link.iter()]
@@ -207,11 +207,11 @@ def _link_problems(link: ET.Element, geometry_only: bool) -> Iterator[str]:
     for shape in shown + link.findall("collision"):
         yield from _repeated(shape, where)
         yield from _misspelt(shape, f"{shape.tag} of {where}")
-        yield from _origin_problems(shape, where)
-        yield from _shape_problems(shape, where, sizes)
+        yield from _origin_faults(shape, where)
+        yield from _shape_faults(shape, where, sizes)
 
 
-def _inertia_problems(inertial: ET.Element, where: str) -> Iterator[str]:
+def _inertia_faults(inertial: ET.Element, where: str) -> Iterator[str]:
     mass = _numbers(inertial, "mass", "value", 1)
     if mass is None or not mass[0] > 0.0:
         text = _attribute(inertial, "mass", "value")
@@ -230,7 +230,7 @@ def _inertia_problems(inertial: ET.Element, where: str) -> Iterator[str]:
         yield f"{where}: inertia breaks the triangle inequality of a real body"
 
 
-def _shape_problems(
+def _shape_faults(
     shape: ET.Element, where: str, sizes: Mapping[str, Mapping[str, int]]
 ) -> Iterator[str]:
     geometry = shape.find("geometry")
@@ -250,7 +250,7 @@ def _shape_problems(
             yield f"{where}: {kind} {name} is {text!r}, expected above 0"
 
 
-def _origin_problems(element: ET.Element, where: str) -> Iterator[str]:
+def _origin_faults(element: ET.Element, where: str) -> Iterator[str]:
     origin = element.find("origin")
     for name in () if origin is None else sorted(origin.keys()):
         if name not in ("xyz", "rpy"):

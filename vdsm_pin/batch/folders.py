@@ -41,7 +41,7 @@ def expanded(problems: tuple[str, ...]) -> tuple[str, ...]:
         if not inside:
             deeper = ", ".join(passed_over((name,)))
             more = f"; folders in it do: {deeper}" if deeper else ""
-            raise InvalidFile(file=name, problem=f"holds no .yaml file{more}")
+            raise InvalidFile(file=name, fault=f"holds no .yaml file{more}")
         found.update(map(str, inside))
     return tuple(sorted(found))
 
@@ -79,8 +79,8 @@ def motions(names: tuple[str, ...], problems: Set[Path]) -> tuple[str, ...]:
         beside = [p for p in Path(name).iterdir() if p.resolve() not in problems]
         inside = [p for p in beside if p.suffix.lower() in MOTIONS or is_bag(p)]
         if not inside:
-            problem = f"holds no trajectory; expected {', '.join(MOTIONS)}"
-            raise InvalidFile(file=name, problem=problem)
+            fault = f"holds no trajectory; expected {', '.join(MOTIONS)}"
+            raise InvalidFile(file=name, fault=fault)
         found.update(str(path) for path in inside)
     return tuple(sorted(found))
 

@@ -187,7 +187,7 @@ def _check_own(folder: Path) -> None:
     for file in (folder / name for name in OWN):
         if file.exists():
             what = "exists and is not a result of a batch; nothing was overwritten"
-            raise InvalidFile(file=file, problem=what)
+            raise InvalidFile(file=file, fault=what)
 
 
 def _check_replaceable(final: Path) -> None:
@@ -196,11 +196,11 @@ def _check_replaceable(final: Path) -> None:
         return
     if not (final / MANIFEST).is_file():
         what = "exists and is not a result of a batch; nothing was overwritten"
-        raise InvalidFile(file=final, problem=what)
+        raise InvalidFile(file=final, fault=what)
     foreign = sorted({path.name for path in final.iterdir()} - WRITTEN)
     if foreign:
         what = f"holds {foreign[0]!r}, which no batch wrote; nothing was overwritten"
-        raise InvalidFile(file=final, problem=what)
+        raise InvalidFile(file=final, fault=what)
 
 
 def _settle(ended: Ended[Task, Done]) -> Done:

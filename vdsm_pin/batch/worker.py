@@ -113,7 +113,7 @@ def _check_apart(task: Task, problem: ProblemOrCell) -> None:
     for file in files:
         if final in file.resolve().parents:
             why = f"lies in {task.final}, which the results would replace"
-            raise InvalidFile(file=file, problem=why)
+            raise InvalidFile(file=file, fault=why)
 
 
 def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:

@@ -144,7 +144,7 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
             reason = printable(f"{run.place}: {error}")
         except DAMAGE as error:
             text = f"cannot be read as a certificate: {error}"
-            raise InvalidFile(file=certificate, where=run.place, problem=text) from None
+            raise InvalidFile(file=certificate, where=run.place, fault=text) from None
     counts = [(one.n_intervals, one.n_claims) for one in run.parts[:1]] or [(0, 0)]
     return Outcome(judged, reason, *counts[0], tuple(notes))
 

@@ -49,8 +49,8 @@ class ArmBuilder(Builder):
         """
         if isinstance(model, str):
             if model not in BUILT_IN:
-                problem = f"is {model!r}; known: {', '.join(BUILT_IN)}, or a mapping"
-                raise self.invalid(self.at, problem)
+                fault = f"is {model!r}; known: {', '.join(BUILT_IN)}, or a mapping"
+                raise self.invalid(self.at, fault)
             return built_in(model)
         if isinstance(model, schema.UrdfManipulatorModel):
             return self._from_urdf(model)
@@ -92,8 +92,8 @@ class ArmBuilder(Builder):
         if model.base_range is not None:
             low, high = (float(x) for x in self.frame.metres(model.base_range))
             if not low <= high:
-                problem = f"is {model.base_range}, expected the smaller value first"
-                raise self.invalid((*self.at, "base_range"), problem)
+                fault = f"is {model.base_range}, expected the smaller value first"
+                raise self.invalid((*self.at, "base_range"), fault)
         self._check_extent(length, max(-low, high))
         return low, high
 
@@ -121,11 +121,11 @@ class ArmBuilder(Builder):
         at, count = (*self.at, "bodies"), len(model.link_lengths)
         for i, body in enumerate(model.bodies):
             if body.link > count:
-                problem = f"is {body.link}, expected 1 to {count}"
-                raise self.invalid((*at, i, "link"), problem)
+                fault = f"is {body.link}, expected 1 to {count}"
+                raise self.invalid((*at, i, "link"), fault)
             if body.name in (TOOL, FEED):
-                problem = f"is {body.name!r}, which the arm's own is called"
-                raise self.invalid((*at, i, "name"), problem)
+                fault = f"is {body.name!r}, which the arm's own is called"
+                raise self.invalid((*at, i, "name"), fault)
         own = self.reading.in_own_frame()
         reader = ObstacleBuilder(own, arm_length, "its joint")
         solids = cast("tuple[BodySolid, ...]", reader.build_all(model.bodies, at))
@@ -155,12 +155,12 @@ class ArmBuilder(Builder):
         """Distances are proved within a stated extent only, so the arm stays there."""
         limit = TOLERANCES.scene_extent
         if not length + stroke <= limit:
-            problem = (
+            fault = (
                 f"is an arm of {self.frame.shown(length)} on a rail that goes "
                 f"{self.frame.shown(stroke)} out; expected at most "
                 f"{self.frame.shown(limit)} together"
             )
-            raise self.invalid(self.at, problem)
+            raise self.invalid(self.at, fault)
 
     def _cables(
         self,
@@ -177,16 +177,14 @@ class ArmBuilder(Builder):
             at = (*self.at, "cables")
             hole_radius, half_gap = cables.hole_radius, cables.half_gap
             if not hole_radius < radius:
-                problem = (
-                    f"is {hole_radius:g}, expected below the body radius {radius:g}"
-                )
-                raise self.invalid((*at, "hole_radius"), problem)
+                fault = f"is {hole_radius:g}, expected below the body radius {radius:g}"
+                raise self.invalid((*at, "hole_radius"), fault)
             if not 2.0 * half_gap < shortest:
-                problem = (
+                fault = (
                     f"is {half_gap:g}, expected below half the shortest link "
                     f"{shortest:g}"
                 )
-                raise self.invalid((*at, "half_gap"), problem)
+                raise self.invalid((*at, "half_gap"), fault)
             if cables.hole_angles_deg is not None:
                 at, rows = (*at, "hole_angles_deg"), cables.hole_angles_deg
                 self.check_count(at, rows, count, "rows", "link")

@@ -16,9 +16,9 @@ def check_replaceable(path: Path) -> None:
         InvalidFile: If there is a folder or a special file.
     """
     if path.is_dir():
-        raise InvalidFile(file=path, problem="is a folder, expected a file")
+        raise InvalidFile(file=path, fault="is a folder, expected a file")
     if path.exists() and not path.is_file():
-        raise InvalidFile(file=path, problem="is there and is not a regular file")
+        raise InvalidFile(file=path, fault="is there and is not a regular file")
 
 
 @contextmanager

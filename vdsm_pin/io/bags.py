@@ -54,8 +54,8 @@ def check_topic(file: Path, topic: str | None) -> None:
         InvalidFile: If one is named.
     """
     if topic is not None and not is_bag(file):
-        problem = f"is no bag, so topic {topic!r} has no meaning"
-        raise InvalidFile(file=file, problem=problem)
+        fault = f"is no bag, so topic {topic!r} has no meaning"
+        raise InvalidFile(file=file, fault=fault)
 
 
 def read_bag(file: Path, topic: str | None = None) -> JointTrajectory:
@@ -162,11 +162,11 @@ def _states(messages: list[Any]) -> dict[str, Any]:
     first = None
     for k, message in enumerate(messages):
         if sorted(message.name) != sorted(names) or len(message.position) != len(names):
-            problem = (
+            fault = (
                 f"message {k}: has {len(message.position)} positions of "
                 f"{message.name}, expected one of each of {names}"
             )
-            raise InvalidInput(problem)
+            raise InvalidInput(fault)
         stamp = message.header.stamp
         time = 1_000_000_000 * stamp.sec + stamp.nanosec  # [ns]
         first = time if first is None else first

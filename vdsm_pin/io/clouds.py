@@ -72,10 +72,10 @@ def read_cloud(path: Path, digest: Digest) -> RawCloud:
     count = int(lost.sum())
     points = points[~lost] if count else points
     if not len(points):
-        raise InvalidFile(file=path, problem="has no point")
+        raise InvalidFile(file=path, fault="has no point")
     if len(points) > MAX_POINTS:
-        problem = f"has {len(points)} points, the most is {MAX_POINTS}"
-        raise InvalidFile(file=path, problem=problem)
+        fault = f"has {len(points)} points, the most is {MAX_POINTS}"
+        raise InvalidFile(file=path, fault=fault)
     stream.check_numbers(points, "point")
     note = f"points without a measurement (NaN) left out: {count}"
     return RawCloud(points, (note,) if count else (), grid)
@@ -85,26 +85,26 @@ def _npy(stream: MeshStream) -> FloatArray:
     """Points, shape (n, 3), or the cells of a grid, 0 or 1 each, shape (a, b, c)."""
     data = io.BytesIO(stream.content.read())
     if not data.getvalue().startswith(_NPY):  # load reads other files too
-        raise stream.invalid(problem="is no array of numbers: it is no NPY file")
+        raise stream.invalid(fault="is no array of numbers: it is no NPY file")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # headers that Python 2 wrote
             array = np.load(data, allow_pickle=False)
     except Exception as error:  # noqa: BLE001 (of a damaged header, whatever it meets)
         said = " ".join(str(error).split())[:120] or type(error).__name__
-        raise stream.invalid(problem=f"is no array of numbers: {said}") from None
+        raise stream.invalid(fault=f"is no array of numbers: {said}") from None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
-        raise stream.invalid(problem="is no array of numbers")
+        raise stream.invalid(fault="is no array of numbers")
     stream.check_end(data.read(), f"an array of shape {array.shape}")
     if array.ndim == 3:
         if not ((array == 0) | (array == 1)).all():
-            problem = "has values besides 0 and 1, expected one of them for each cell"
-            raise stream.invalid(problem)
+            fault = "has values besides 0 and 1, expected one of them for each cell"
+            raise stream.invalid(fault)
         return np.asarray(array)
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind == "b":
-        problem = f"has an array of {array.dtype} of shape {array.shape}, "
-        problem += "expected points (n, 3), or cells in three dimensions"
-        raise stream.invalid(problem)
+        fault = f"has an array of {array.dtype} of shape {array.shape}, "
+        fault += "expected points (n, 3), or cells in three dimensions"
+        raise stream.invalid(fault)
     return doubles(array)
 
 
@@ -138,22 +138,22 @@ def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
         words = [_QUOTED.sub(r"\1", word) for word in _BETWEEN.split(line)]
         mixed = "," in line and _DECIMAL_COMMA.search(line.encode())
         if mixed:
-            problem = "has commas inside numbers, expected decimal points"
-            raise stream.invalid(problem, line=number)
+            fault = "has commas inside numbers, expected decimal points"
+            raise stream.invalid(fault, line=number)
         title = number == 1 and (words[0].isdecimal() or not _is_number(words[0]))
         title = title and (len(words) == 1 or words[0][:1].isalpha())
         commas |= {line.count(",")} - {0}
         if len(commas) > 1:
-            problem = "has another number of commas than lines before it"
-            raise stream.invalid(problem, line=number)
+            fault = "has another number of commas than lines before it"
+            raise stream.invalid(fault, line=number)
         if title:
             announced = words[0] if words[0].isdecimal() else ""
             _check_title(stream, [word.lower() for word in words])
         elif words != [""]:
             rows.append(stream.numbers(words[:3], 3, number))
     if announced and announced.lstrip("0") != str(len(rows)).lstrip("0"):
-        problem = f"announces {announced} points, {len(rows)} follow"
-        raise stream.invalid(problem, line=1)
+        fault = f"announces {announced} points, {len(rows)} follow"
+        raise stream.invalid(fault, line=1)
     return np.array(rows).reshape(-1, 3)
 
 
@@ -168,8 +168,8 @@ def _check_title(stream: MeshStream, names: list[str]) -> None:
     """Refuse columns of which x, y and z are not the first."""
     for place, name in enumerate("xyz"):
         if name in names and names.index(name) != place:
-            problem = f"has the columns {' '.join(names)}, expected x, y and z first"
-            raise stream.invalid(problem, line=1)
+            fault = f"has the columns {' '.join(names)}, expected x, y and z first"
+            raise stream.invalid(fault, line=1)
 
 
 _READERS: Final[dict[str, Callable[[MeshStream], FloatArray]]] = {

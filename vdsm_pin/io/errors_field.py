@@ -90,11 +90,11 @@ class ErrorsModel(FileModel):
             at = ("errors", "obstacles", i)
             if one.name not in solids:
                 known = ", ".join(solids) or "none"
-                problem = f"is {one.name!r}, expected one of {known}"
-                errors.add(document.invalid((*at, "name"), problem))
+                fault = f"is {one.name!r}, expected one of {known}"
+                errors.add(document.invalid((*at, "name"), fault))
             elif one.turn_deg and isinstance(solids[one.name], HalfSpace):
-                problem = "is of a half_space, which has no middle to turn about"
-                errors.add(document.invalid((*at, "turn_deg"), problem))
+                fault = "is of a half_space, which has no middle to turn about"
+                errors.add(document.invalid((*at, "turn_deg"), fault))
         errors.raise_if_any()
         fields = in_si(
             UNITS_PER_METRE[unit],

@@ -183,9 +183,9 @@ class Builder:
         """Its unit and base."""
         return self.reading.frame
 
-    def invalid(self, at: Location, problem: str) -> InvalidFile:
+    def invalid(self, at: Location, fault: str) -> InvalidFile:
         """The error that names a value by its field and line."""
-        return self.document.invalid(at, problem)
+        return self.document.invalid(at, fault)
 
     def check_count(
         self, at: Location, rows: Sized, count: int, noun: str, per: str
@@ -197,8 +197,8 @@ class Builder:
                 per link or joint.
         """
         if len(rows) != count:
-            problem = f"has {len(rows)} {noun}, expected {count}, one per {per}"
-            raise self.invalid(at, problem)
+            fault = f"has {len(rows)} {noun}, expected {count}, one per {per}"
+            raise self.invalid(at, fault)
 
     def check_extent(self, at: Location, reach: float, what: str, origin: str) -> None:
         """Distances are exact to a stated bound only within a stated extent.
@@ -215,5 +215,5 @@ class Builder:
         limit = TOLERANCES.scene_extent
         if not reach <= limit:
             far, most = self.frame.shown(reach), self.frame.shown(limit)
-            problem = f"{what} {far} from {origin}, expected at most {most}"
-            raise self.invalid(at, problem)
+            fault = f"{what} {far} from {origin}, expected at most {most}"
+            raise self.invalid(at, fault)

@@ -65,7 +65,7 @@ def read_mesh(path: Path, digest: Digest | None = None) -> RawMesh:
     with opened(path, limit=MAX_MESH_BYTES, digest=digest) as (size, content):
         raw = _READERS[kind](MeshStream(path, size, content))
     if not len(raw.triangles):
-        raise InvalidFile(file=path, problem="has no triangle")
+        raise InvalidFile(file=path, fault="has no triangle")
     used = np.zeros(len(raw.vertices), dtype=np.bool_)
     used[raw.triangles] = True
     vertices = raw.vertices[used]
@@ -167,17 +167,17 @@ class MeshSize:
         beside = f"beside an arm of {self.frame.shown(arm_length)}"
         if not low <= ratio <= high:
             factor = 1.0 / _THOUSAND if ratio > 1.0 else _THOUSAND
-            problem = (
+            fault = (
                 f"makes {self.model.file!r} {self.frame.shown(self.diagonal)} large "
                 f"{beside}; if the file is in another unit, try "
                 f"scale: {self.model.scale * factor:g}, else set check_size: false"
             )
-            raise document.invalid((*at, "scale"), problem)
+            raise document.invalid((*at, "scale"), fault)
         millimetres = not self.stated and self.frame.unit == "mm"
         if millimetres and ratio * _THOUSAND <= high:
             size = f"{self.diagonal * UNITS_PER_METRE['mm']:.4g}"
-            problem = (
+            fault = (
                 f"{self.model.file!r} states no unit and is {size} mm or {size} m "
                 f"large {beside}; expected length_unit: mm or length_unit: m"
             )
-            raise document.invalid((*at, "file"), problem)
+            raise document.invalid((*at, "file"), fault)

@@ -58,20 +58,18 @@ class MotionModel(FileModel):
         late = np.flatnonzero(~(np.diff(times) > 0.0))
         if late.size:
             k = int(late[0]) + 1
-            problem = (
-                f"is {times[k]:g}, expected above {times[k - 1]:g}, the time before"
-            )
-            raise document.invalid((*at, "times_s", k), problem)
+            fault = f"is {times[k]:g}, expected above {times[k - 1]:g}, the time before"
+            raise document.invalid((*at, "times_s", k), fault)
         if self.positions is None and self.rpy_deg is None:
-            problem = "has neither positions nor rpy_deg, so nothing moves"
-            raise document.invalid(at, problem)
+            fault = "has neither positions nor rpy_deg, so nothing moves"
+            raise document.invalid(at, fault)
         given = {"positions": self.positions, "rpy_deg": self.rpy_deg}
         for name, rows in given.items():
             if rows is not None and len(rows) != len(times):
-                problem = (
+                fault = (
                     f"has {len(rows)} rows, expected {len(times)}, one for each time"
                 )
-                raise document.invalid((*at, name), problem)
+                raise document.invalid((*at, name), fault)
         places = _rows(self.positions, len(times)) - frame.origin
         turns = _rows(self.rpy_deg, len(times))
         turns = np.deg2rad(turns - (turns[0] - np.fmod(turns[0], 360.0)))

@@ -66,8 +66,8 @@ class ObstacleBuilder(Builder):
 
         def check(model: MovableModel, at: Location) -> None:
             if arm is not None and arm.owner_of(model.name) in arm.body_names:
-                problem = f"is {model.name!r}, which a body of the arm is called"
-                raise self.invalid((*at, "name"), problem)
+                fault = f"is {model.name!r}, which a body of the arm is called"
+                raise self.invalid((*at, "name"), fault)
 
         errors, at = ErrorCollector(), ("obstacles",)
         obstacles = errors.attempt(self.build_all, models, at)
@@ -102,11 +102,11 @@ class ObstacleBuilder(Builder):
         """Refuse the name of a link, and one that an entry before it has."""
         *_, where, i = at
         if _LINK_NAME.fullmatch(name):
-            problem = f"is {name!r}, which is how links of the arm are named"
-            raise self.invalid((*at, "name"), problem)
+            fault = f"is {name!r}, which is how links of the arm are named"
+            raise self.invalid((*at, "name"), fault)
         if first != i:
-            problem = f"is {name!r}, which {where}[{first}] is called already"
-            raise self.invalid((*at, "name"), f"{problem}; names are unique")
+            fault = f"is {name!r}, which {where}[{first}] is called already"
+            raise self.invalid((*at, "name"), f"{fault}; names are unique")
 
     def _checked(self, model: Any, at: Location) -> scene.Obstacle:
         motion: MotionModel | None = getattr(model, "motion", None)
@@ -171,8 +171,8 @@ class ObstacleBuilder(Builder):
     @build.register
     def _(self, model: schema.PrismModel, at: Location) -> solids.Solid:
         if not model.from_ < model.to:
-            problem = f"is {model.to:g}, expected above from = {model.from_:g}"
-            raise self.invalid((*at, "to"), problem)
+            fault = f"is {model.to:g}, expected above from = {model.from_:g}"
+            raise self.invalid((*at, "to"), fault)
         polygon = np.array(model.polygon)
         self._check_simple(without_repeats(polygon, closed=True), (*at, "polygon"))
         # Columns: the two axes of the section, then the sweep; right-handed.
@@ -180,8 +180,8 @@ class ObstacleBuilder(Builder):
         base = self.frame.origin[order]
         low, high = self.frame.metres(np.array([model.from_, model.to]) - base[2])
         if not low < high:
-            problem = f"is {model.to!r}, too near to from = {model.from_!r}"
-            raise self.invalid((*at, "to"), problem)
+            fault = f"is {model.to!r}, too near to from = {model.from_!r}"
+            raise self.invalid((*at, "to"), fault)
         return solids.Prism(
             model.name,
             np.zeros(3),
@@ -199,8 +199,8 @@ class ObstacleBuilder(Builder):
         shape = shapely.Polygon(polygon)
         if not shape.is_valid:
             reason = shapely.is_valid_reason(shape)
-            problem = f"crosses or touches itself ({reason}); expected a simple polygon"
-            raise self.invalid(at, problem)
+            fault = f"crosses or touches itself ({reason}); expected a simple polygon"
+            raise self.invalid(at, fault)
 
     @build.register
     def _(self, model: schema.HalfSpaceModel, at: Location) -> solids.Solid:
@@ -222,16 +222,16 @@ class ObstacleBuilder(Builder):
             notes=(*mesh.notes, *size.bent(mesh.bend)),
         )
         if model.solid and not found.closed_mesh.closed:
-            problem = f"is true, but {model.file!r} {found.closed_mesh.why_open}"
-            raise self.invalid((*at, "solid"), problem)
+            fault = f"is true, but {model.file!r} {found.closed_mesh.why_open}"
+            raise self.invalid((*at, "solid"), fault)
         return found
 
     @build.register
     def _(self, model: schema.PointsModel, at: Location) -> solids.Solid:
         cloud = self._read(read_cloud, model, at)
         if cloud.grid:
-            problem = f"{model.file!r} is a grid of cells; expected points, or "
-            raise self.invalid((*at, "file"), problem + "shape: voxels")
+            fault = f"{model.file!r} is a grid of cells; expected points, or "
+            raise self.invalid((*at, "file"), fault + "shape: voxels")
         size = MeshSize.of(cloud.points, model, self.frame)
         return solids.PointCloud(
             model.name,
@@ -249,10 +249,8 @@ class ObstacleBuilder(Builder):
             key for key in ("length_unit", "scale") if key in model.model_fields_set
         ]
         if cloud.grid and stray:
-            problem = (
-                f"has no meaning: {model.file!r} is a grid, whose cells are `size`"
-            )
-            raise self.invalid((*at, stray[0]), problem)
+            fault = f"has no meaning: {model.file!r} is a grid, whose cells are `size`"
+            raise self.invalid((*at, stray[0]), fault)
         points = points * edges if cloud.grid else points
         size = MeshSize.of(points, model, self.frame, self._unit_of_grid(cloud))
         return solids.Voxels(

@@ -109,8 +109,8 @@ class OtherReader(Builder):
     def _timed(self, model: OtherModel, at: Location) -> Others:
         found = self._one(model, at)
         if not found.timed:
-            problem = f"{model.trajectory!r} has no times, which it needs: time_s"
-            raise self.document.invalid((*at, "trajectory"), problem)
+            fault = f"{model.trajectory!r} has no times, which it needs: time_s"
+            raise self.document.invalid((*at, "trajectory"), fault)
         return found
 
     def _one(self, model: OtherModel, at: Location) -> Others:
@@ -124,16 +124,16 @@ class OtherReader(Builder):
             raise self.document.invalid_file(where, model.trajectory, error) from None
         if model.manipulator is None and model.robot is not None:
             if self.read_robot is None:
-                problem = "is of a URDF, which is not read here"
-                raise self.document.invalid((*at, "robot"), problem)
+                fault = "is of a URDF, which is not read here"
+                raise self.document.invalid((*at, "robot"), fault)
             more = file, model.topic, frozen(pose)
             return self.read_robot(OtherFile(model.name, model.robot, folder, *more))
         if model.manipulator is None or model.robot is not None:
-            problem = "has both or none of manipulator and robot, expected one of them"
-            raise self.document.invalid(at, problem)
+            fault = "has both or none of manipulator and robot, expected one of them"
+            raise self.document.invalid(at, fault)
         if model.topic is not None:
-            problem = f"is {model.topic!r}, but trajectories of snake arms are no bags"
-            raise self.document.invalid((*at, "topic"), problem)
+            fault = f"is {model.topic!r}, but trajectories of snake arms are no bags"
+            raise self.document.invalid((*at, "topic"), fault)
         # What it reads is handed on with the trajectory: `build_problem` hashes it.
         reading = replace(self.reading, digest=sha256(), files=[])
         arm = ArmBuilder(reading, (*at, "manipulator")).build(model.manipulator)

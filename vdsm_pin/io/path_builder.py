@@ -128,8 +128,8 @@ class PathBuilder(PostureBuilder):
             return None
         given = [asked.target, asked.direction, asked.directions]
         if sum(one is not None for one in given) != 1:
-            problem = "expected one of target, direction and directions"
-            raise self.invalid(at, problem)
+            fault = "expected one of target, direction and directions"
+            raise self.invalid(at, fault)
         cone = float(np.deg2rad(asked.cone_deg))
         with self.document.naming(at):
             if asked.target is not None:
@@ -210,9 +210,9 @@ class PathBuilder(PostureBuilder):
         approach = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
         rows = (path.length + approach) / path.spacing
         if not rows <= MAX_ROWS:
-            problem = (
+            fault = (
                 f"is {self.frame.shown(path.spacing)}, which cuts "
                 f"{self.frame.shown(path.length + approach)} of path into more than "
                 f"{MAX_ROWS} rows"
             )
-            raise self.invalid(("tip_path", "spacing"), problem)
+            raise self.invalid(("tip_path", "spacing"), fault)

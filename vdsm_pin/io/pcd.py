@@ -64,7 +64,7 @@ def _header(stream: MeshStream) -> _Header:
         said[words[0]] = words[1:]
         if words[0] == "DATA":
             return _understood(stream, said, number)
-    raise stream.invalid(problem="is no PCD file: no line DATA in its header")
+    raise stream.invalid(fault="is no PCD file: no line DATA in its header")
 
 
 def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _Header:
@@ -93,23 +93,21 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
         and form in ("ascii", "binary", "binary_compressed")
     )
     if not good or any(names.count(axis) != 1 for axis in "xyz"):
-        problem = "has a header that is no PCD's: expected FIELDS with x y z, SIZE, "
-        problem += "TYPE, COUNT from 1, POINTS, DATA ascii, binary or binary_compressed"
-        raise stream.invalid(problem)
+        fault = "has a header that is no PCD's: expected FIELDS with x y z, SIZE, "
+        fault += "TYPE, COUNT from 1, POINTS, DATA ascii, binary or binary_compressed"
+        raise stream.invalid(fault)
     points, *others = (math.prod(int(w[0]) for w in total) for total in totals)
     if others and others[0] != points:
-        problem = f"has WIDTH x HEIGHT = {points}, but POINTS {others[0]}"
-        raise stream.invalid(problem)
+        fault = f"has WIDTH x HEIGHT = {points}, but POINTS {others[0]}"
+        raise stream.invalid(fault)
     seen_from = stream.numbers(said.get("VIEWPOINT", list(map(str, _FRAME))), 7, lines)
     if (*seen_from,) != _FRAME:
-        problem = (
-            f"has the VIEWPOINT {' '.join(said['VIEWPOINT'])}, which may place its "
-        )
-        problem += "points or not; expected points that it does not, and 0 0 0 1 0 0 0"
-        raise stream.invalid(problem)
+        fault = f"has the VIEWPOINT {' '.join(said['VIEWPOINT'])}, which may place its "
+        fault += "points or not; expected points that it does not, and 0 0 0 1 0 0 0"
+        raise stream.invalid(fault)
     stream.check_room(points)
     if not points:
-        raise stream.invalid(problem="has no point")
+        raise stream.invalid(fault="has no point")
     fields = [
         (f"{name}" if name in "xyz" else f"{name} {k}", f"<{_KINDS[t]}{s}", (int(c),))
         for k, (name, t, s, c) in enumerate(
@@ -134,8 +132,8 @@ def _text(stream: MeshStream, header: _Header, data: bytes) -> FloatArray:
     for number, line in enumerate(lines, header.lines + 1):
         words = line.split()
         if len(words) != starts[-1]:
-            problem = f"has {len(words)} values, expected {starts[-1]}"
-            raise stream.invalid(problem, line=number)
+            fault = f"has {len(words)} values, expected {starts[-1]}"
+            raise stream.invalid(fault, line=number)
         rows.append(stream.numbers([words[k] for k in place], 3, number))
     return np.array(rows).reshape(-1, 3)
 
@@ -159,7 +157,7 @@ def _unpacked(stream: MeshStream, header: _Header, data: bytes) -> bytes:
     _check_size(stream, header, data, 8 + packed)
     found = _from_lzf(data[8 : 8 + packed], wanted)
     if not len(found) == size == wanted:
-        raise stream.invalid(problem="has compressed data that is damaged")
+        raise stream.invalid(fault="has compressed data that is damaged")
     return found
 
 
@@ -198,6 +196,6 @@ def _check_size(
 ) -> None:
     """Refuse bytes or lines that are fewer than the header announces, or more."""
     if len(data) < wanted:
-        problem = f"is cut short: its header promises {header.points} points"
-        raise stream.invalid(problem)
+        fault = f"is cut short: its header promises {header.points} points"
+        raise stream.invalid(fault)
     stream.check_end(data[wanted:], f"{header.points} points")

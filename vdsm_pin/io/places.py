@@ -31,13 +31,13 @@ class Place:
             InvalidFile: If there is none.
         """
         if isinstance(key, str) and not isinstance(self.value, dict):
-            problem = "is no mapping"
-            raise self.invalid(problem)
+            fault = "is no mapping"
+            raise self.invalid(fault)
         try:
             return Place(self.document, (*self.at, key), self.value[key])
         except (KeyError, IndexError, TypeError):
-            problem = f"has no {key!r}"
-            raise self.invalid(problem) from None
+            fault = f"has no {key!r}"
+            raise self.invalid(fault) from None
 
     def get(self, key: str, default: Any = None) -> "Place":
         """What stands under a key, or a default where nothing does.
@@ -47,8 +47,8 @@ class Place:
         """
         known = isinstance(self.value, dict)
         if not known and default is not None and self.value is not None:
-            problem = "is no mapping"
-            raise self.invalid(problem)
+            fault = "is no mapping"
+            raise self.invalid(fault)
         found = self.value.get(key) if known else None
         return Place(
             self.document, (*self.at, key), default if found is None else found
@@ -61,8 +61,8 @@ class Place:
             InvalidFile: If it is none.
         """
         if not isinstance(self.value, list):
-            problem = "is no list"
-            raise self.invalid(problem)
+            fault = "is no list"
+            raise self.invalid(fault)
         return [self[k] for k in range(len(self.value))]
 
     def keys(self) -> list[str]:
@@ -72,12 +72,12 @@ class Place:
             InvalidFile: If it is none, or a key is no text.
         """
         if not isinstance(self.value, dict):
-            problem = "is no mapping"
-            raise self.invalid(problem)
+            fault = "is no mapping"
+            raise self.invalid(fault)
         for key in self.value:
             if not isinstance(key, str):
-                problem = f"has the key {key!r}, expected a name"
-                raise self.invalid(problem)
+                fault = f"has the key {key!r}, expected a name"
+                raise self.invalid(fault)
         return list(self.value)
 
     def number(self) -> float:
@@ -87,8 +87,8 @@ class Place:
             InvalidFile: If it is another thing.
         """
         if (found := finite_numbers([self.value], 1)) is None:
-            problem = f"is {str(self.value)[:60]}, expected a finite number"
-            raise self.invalid(problem)
+            fault = f"is {str(self.value)[:60]}, expected a finite number"
+            raise self.invalid(fault)
         return found[0]
 
     def numbers(self, count: int) -> FloatArray:
@@ -99,17 +99,17 @@ class Place:
         """
         values = finite_numbers(self.value, count)
         if values is None:
-            problem = f"is {str(self.value)[:60]}, expected {count} finite numbers"
-            raise self.invalid(problem)
+            fault = f"is {str(self.value)[:60]}, expected {count} finite numbers"
+            raise self.invalid(fault)
         return np.array(values, dtype=np.float64)
 
     def naming(self) -> AbstractContextManager[None]:
         """Name the value where it makes what is done within invalid."""
         return self.document.naming(self.at)
 
-    def invalid(self, problem: str) -> InvalidFile:
+    def invalid(self, fault: str) -> InvalidFile:
         """The value is not what is expected."""
-        return self.document.invalid(self.at, problem)
+        return self.document.invalid(self.at, fault)
 
 
 def finite_numbers(row: Any, count: int) -> list[float] | None:

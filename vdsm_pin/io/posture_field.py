@@ -77,8 +77,8 @@ class PostureBuilder(Builder):
         """
         if (model.tip is None) == (model.joints is None):
             count = "both" if model.joints else "neither"
-            problem = f"has {count} of tip and joints, expected one of them"
-            raise self.invalid(at, problem)
+            fault = f"has {count} of tip and joints, expected one of them"
+            raise self.invalid(at, fault)
         if model.joints is not None:
             return self._posture(model.joints, (*at, "joints"))
         tip = self.frame.point(model.tip)
@@ -92,25 +92,25 @@ class PostureBuilder(Builder):
     def _joints(self, model: JointsModel, at: Location) -> FloatArray:
         n, x0 = self.arm.n_links, float(self.frame.metres(model.x0))
         if not self._on_rail(x0):
-            problem = f"is {self.frame.shown(x0)}, expected {self._rail()}"
-            raise self.invalid((*at, "x0"), problem)
+            fault = f"is {self.frame.shown(x0)}, expected {self._rail()}"
+            raise self.invalid((*at, "x0"), fault)
         angles = {"alpha_deg": model.alpha_deg, "theta_deg": model.theta_deg}
         limit = np.rad2deg(self.arm.max_joint_angle)
         for name, values in angles.items():
             self.check_count((*at, name), values, n, "values", "joint")
             for i, value in enumerate(values):
                 if not abs(value) <= limit + np.rad2deg(TOLERANCES.joint_limit):
-                    problem = f"is {value:g}°, the joint's limit is {limit:g}°"
-                    raise self.invalid((*at, name, i), problem)
+                    fault = f"is {value:g}°, the joint's limit is {limit:g}°"
+                    raise self.invalid((*at, name, i), fault)
         alpha, theta = radians([model.alpha_deg, model.theta_deg])
         psi = link_angles(alpha, theta)
         worst = int(np.argmax(psi))
         if not psi[worst] <= self.arm.max_link_angle + TOLERANCES.joint_limit:
-            problem = (
+            fault = (
                 f"has a link angle psi of {np.rad2deg(psi[worst]):.4g}° at joint "
                 f"{worst + 1}, the limit is {np.rad2deg(self.arm.max_link_angle):.4g}°"
             )
-            raise self.invalid(at, problem)
+            raise self.invalid(at, fault)
         return np.concatenate([[x0], np.column_stack([alpha, theta]).reshape(-1)])
 
     def _tip(self, joints: FloatArray) -> FloatArray:
@@ -121,11 +121,11 @@ class PostureBuilder(Builder):
     def _check_reach(self, tip: FloatArray, at: Location) -> None:
         length, away = self.arm.total_length, float(np.hypot(tip[1], tip[2]))
         if not away < length:
-            problem = (
+            fault = (
                 f"lies {self.frame.shown(away)} from the rail, the arm is "
                 f"{self.frame.shown(length)} long"
             )
-            raise self.invalid(at, problem)
+            raise self.invalid(at, fault)
 
     def _check_straight(self, start: FloatArray, at: Location) -> None:
         """A start given by the tip alone stands for the straight arm."""
@@ -140,18 +140,18 @@ class PostureBuilder(Builder):
         }
         for name, (angle, limit) in angles.items():
             if not abs(angle) <= limit + TOLERANCES.joint_limit:
-                problem = (
+                fault = (
                     f"needs a {name} of {np.rad2deg(abs(angle)):.4g}° of the "
                     f"straight arm, the limit is {np.rad2deg(limit):.4g}°{advice}"
                 )
-                raise self.invalid(at, problem)
+                raise self.invalid(at, fault)
         x0 = float(start[0]) - along
         if not self._on_rail(x0):
-            problem = (
+            fault = (
                 f"puts the base of the straight arm at x0 = {self.frame.shown(x0)}, "
                 f"expected {self._rail()}{advice}"
             )
-            raise self.invalid(at, problem)
+            raise self.invalid(at, fault)
 
     def _on_rail(self, x0: float) -> bool:
         low, high = self.arm.base_range

@@ -134,8 +134,8 @@ def _errors(
     """The errors that every clearance holds under; None where the scene is invalid."""
     document, joint, collector = reading.document, model.joint_deg, ErrorCollector()
     if arm and isinstance(joint, list) and len(joint) != arm.n_links:
-        problem = f"has {len(joint)} values, expected {arm.n_links}: one per joint"
-        collector.add(document.invalid(("errors", "joint_deg"), problem))
+        fault = f"has {len(joint)} values, expected {arm.n_links}: one per joint"
+        collector.add(document.invalid(("errors", "joint_deg"), fault))
     errors = None
     if scene is not None:
         errors = collector.attempt(model.box, reading.frame.unit, scene, document)
@@ -151,11 +151,11 @@ def _scaling(model: schema.RatiosModel, arm: Manipulator, reading: Reading) -> S
     document, frame = reading.document, reading.frame
     given = (model.values, model.scaling_centre, model.cylinder_radius)
     if sum(one is not None for one in given) != 1:
-        problem = "expected one of values, scaling_centre and cylinder_radius"
-        raise document.invalid(("ratios",), problem)
+        fault = "expected one of values, scaling_centre and cylinder_radius"
+        raise document.invalid(("ratios",), fault)
     if (model.joint is None) != (model.scaling_centre is None):
-        problem = "expected scaling_centre and joint together"
-        raise document.invalid(("ratios",), problem)
+        fault = "expected scaling_centre and joint together"
+        raise document.invalid(("ratios",), fault)
     found: Scaling
     with document.naming(("ratios",)):
         if model.values is not None:
@@ -180,12 +180,12 @@ def _tip_tolerance(
     if model.tip_path is not None:
         spacing = spacing_of(model.tip_path, frame)
         if not tolerance <= spacing:
-            problem = (
+            fault = (
                 f"is {frame.shown(tolerance)}, expected at most the spacing of the "
                 f"path, {frame.shown(spacing)}: so far may the tip stray between "
                 "waypoints"
             )
-            raise document.invalid(("tip_tolerance",), problem)
+            raise document.invalid(("tip_tolerance",), fault)
     return tolerance
 
 
@@ -203,8 +203,8 @@ def _check_ends(model: schema.ProblemModel, document: YamlDocument) -> None:
         ("goal", "let the path end there"),
     ):
         if getattr(model, name) is not None:
-            problem = f"stands beside tip_path, which has its own; {advice}"
-            raise document.invalid((name,), problem)
+            fault = f"stands beside tip_path, which has its own; {advice}"
+            raise document.invalid((name,), fault)
 
 
 def _check_ignored(
@@ -225,10 +225,10 @@ def _check_links_apart(
     for i in range(1, arm.n_links - 1):
         needed = arm.radius_of(i) + arm.radius_of(i + 2) + self_clearance
         if not arm.link_lengths[i] > needed:
-            problem = (
+            fault = (
                 f"is {frame.shown(arm.link_lengths[i])}, expected above "
                 f"{frame.shown(needed)}: the radii of its neighbours and the "
                 "self-clearance, else the links on either side of it always touch"
             )
             at = ("manipulator", "link_lengths", i)
-            raise reading.document.invalid(at, problem)
+            raise reading.document.invalid(at, fault)

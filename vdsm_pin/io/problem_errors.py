@@ -132,7 +132,7 @@ def first_error(
 
     return together(
         [
-            document.invalid(at, _problem(details, at, model))
+            document.invalid(at, _fault(details, at, model))
             for at, details in sorted(found, key=rank)
         ]
     )
@@ -192,7 +192,7 @@ def _location(details: ErrorDetails, data: Data) -> Location:
     return tuple(location)
 
 
-def _problem(details: ErrorDetails, at: Location, model: type[FileModel]) -> str:
+def _fault(details: ErrorDetails, at: Location, model: type[FileModel]) -> str:
     """One clause: the value found and what was expected."""
     loc, kind, context = details["loc"], details["type"], details.get("ctx", {})
     match kind:

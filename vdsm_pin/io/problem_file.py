@@ -54,7 +54,7 @@ def read_document(path: Path) -> ProblemDocument:
     text = decode(content, path)
     if text.lstrip().startswith(("<?xml", "<robot", "<!--")):
         what = "is XML, expected a problem file, which may name a URDF"
-        raise InvalidFile(file=path, problem=what)
+        raise InvalidFile(file=path, fault=what)
     return ProblemDocument(path, content, read_yaml(text, file=path))
 
 
@@ -127,8 +127,8 @@ def find_problem(name_or_path: str | Path) -> Path:
         with suppress(OSError, ValueError):
             inside = path / "problem.yaml"
             hint = f"try {inside}" if inside.is_file() else hint
-        problem = f"{error.problem}; {hint}"
-        raise InvalidFile(file=name or "''", problem=problem) from None
+        fault = f"{error.fault}; {hint}"
+        raise InvalidFile(file=name or "''", fault=fault) from None
     return path
 
 

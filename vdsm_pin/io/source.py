@@ -59,14 +59,14 @@ def check_is_file(path: Path) -> None:
     """
     try:
         if path.is_dir():
-            raise InvalidFile(file=path, problem="is a folder, expected a file")
+            raise InvalidFile(file=path, fault="is a folder, expected a file")
         if not path.exists():
-            raise InvalidFile(file=path, problem="does not exist")
+            raise InvalidFile(file=path, fault="does not exist")
         if not path.is_file():
-            raise InvalidFile(file=path, problem="is not a regular file")
+            raise InvalidFile(file=path, fault="is not a regular file")
     except (OSError, ValueError) as error:  # a name too long, or with a NUL in it
         reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be opened: {reason}") from None
+        raise InvalidFile(file=path, fault=f"cannot be opened: {reason}") from None
 
 
 def check_is_file_or_bag(path: Path) -> None:
@@ -92,7 +92,7 @@ def readable(path: Path) -> Iterator[None]:
         yield
     except (OSError, EOFError, zlib.error) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+        raise InvalidFile(file=path, fault=f"cannot be read: {reason}") from None
 
 
 @contextmanager
@@ -107,7 +107,7 @@ def naming_file(path: Path) -> Iterator[None]:
     except InvalidFile:  # which names its place
         raise
     except InvalidInput as error:
-        raise InvalidFile(file=path, problem=str(error)) from None
+        raise InvalidFile(file=path, fault=str(error)) from None
 
 
 def read_bytes(path: Path, *, limit: int) -> bytes:
@@ -149,8 +149,8 @@ def decode(data: bytes, path: Path) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        problem = f"is not UTF-8 text (byte 0x{data[error.start]:02x})"
-        raise InvalidFile(file=path, where=f"line {line}", problem=problem) from None
+        fault = f"is not UTF-8 text (byte 0x{data[error.start]:02x})"
+        raise InvalidFile(file=path, where=f"line {line}", fault=fault) from None
 
 
 @contextmanager
@@ -183,10 +183,10 @@ def opened(
 
 def _check_size(path: Path, size: int, limit: int) -> None:
     if not size:
-        raise InvalidFile(file=path, problem="is empty")
+        raise InvalidFile(file=path, fault="is empty")
     if size > limit:
-        problem = f"is larger than {limit / 1e6:.0f} MB, the most that is read"
-        raise InvalidFile(file=path, problem=problem)
+        fault = f"is larger than {limit / 1e6:.0f} MB, the most that is read"
+        raise InvalidFile(file=path, fault=fault)
 
 
 class _Hashed(io.RawIOBase):
@@ -225,8 +225,8 @@ def bounded_lines(path: Path, *, limit: int = MAX_LINE) -> Iterator[bytes]:
         while line := stream.readline(limit + 1):
             number += 1
             if len(line) > limit:
-                problem = f"is longer than {limit >> 20} MB, the most that is read"
-                raise InvalidFile(file=path, where=f"line {number}", problem=problem)
+                fault = f"is longer than {limit >> 20} MB, the most that is read"
+                raise InvalidFile(file=path, where=f"line {number}", fault=fault)
             yield line
 
 
@@ -278,7 +278,7 @@ def check_unchanged(path: Path, digest: str) -> None:
     with readable(path):
         same = sha256_of_file(path) == digest
     if not same:
-        raise InvalidFile(file=path, problem="changed while it was worked on")
+        raise InvalidFile(file=path, fault="changed while it was worked on")
 
 
 def sha256_of(parts: Iterable[bytes]) -> str:

@@ -50,12 +50,12 @@ class Row:
     line: int
     ended: bool = True
 
-    def invalid(self, problem: str) -> InvalidFile:
+    def invalid(self, fault: str) -> InvalidFile:
         """The error that names file and line."""
         where = f"line {self.line}"
         if not self.ended:
-            problem += "; the line has no end: is the file cut short?"
-        return InvalidFile(file=self.file, where=where, problem=problem)
+            fault += "; the line has no end: is the file cut short?"
+        return InvalidFile(file=self.file, where=where, fault=fault)
 
 
 class Table:
@@ -83,7 +83,7 @@ class Table:
         self._decimal = ""  # the sign of the first number that has one
         line = text.readline(MAX_ROW_LINE)
         if not line:
-            raise InvalidFile(file=file, problem="is empty")
+            raise InvalidFile(file=file, fault="is empty")
         self._check_ends([line], 1)
         self._between, self.names = max(
             ((sign, split(line, sign)) for sign in BETWEEN),
@@ -106,11 +106,11 @@ class Table:
         self.ignored = tuple(name for name in names if name not in self.columns)
         for name in self.columns:
             if names.count(name) > 1:
-                problem = f"has the column {name!r} {names.count(name)} times"
-                raise head.invalid(problem)
+                fault = f"has the column {name!r} {names.count(name)} times"
+                raise head.invalid(fault)
             if name not in names:
-                problem = f"has no column {name!r}{self._instead(name)}"
-                raise head.invalid(problem)
+                fault = f"has no column {name!r}{self._instead(name)}"
+                raise head.invalid(fault)
         self._places = [names.index(name) for name in self.columns]
 
     def _instead(self, name: str) -> str:
@@ -144,10 +144,10 @@ class Table:
         for part in self.rows():
             parts.append(part)
             if sum(map(len, parts)) > MAX_ROWS:
-                problem = f"has more than {MAX_ROWS} rows"
-                raise InvalidFile(file=self.file, problem=problem)
+                fault = f"has more than {MAX_ROWS} rows"
+                raise InvalidFile(file=self.file, fault=fault)
         if not parts:
-            raise InvalidFile(file=self.file, problem="has no row")
+            raise InvalidFile(file=self.file, fault="has no row")
         return np.concatenate(parts)
 
     def rows(self) -> Iterator[FloatArray]:
@@ -176,11 +176,11 @@ class Table:
         for i, line in enumerate(lines):
             if line[-1] != "\n":
                 if len(line) == MAX_ROW_LINE:
-                    problem = f"is longer than {MAX_ROW_LINE} characters"
-                    raise Row(self.file, number + i).invalid(problem)
+                    fault = f"is longer than {MAX_ROW_LINE} characters"
+                    raise Row(self.file, number + i).invalid(fault)
                 if _CUT.search(line):
-                    problem = f"ends in {line[-8:]!r}, whose exponent may be cut short"
-                    raise Row(self.file, number + i, ended=False).invalid(problem)
+                    fault = f"ends in {line[-8:]!r}, whose exponent may be cut short"
+                    raise Row(self.file, number + i, ended=False).invalid(fault)
                 self.open_ended = True
 
     def _blank(self, lines: list[str], number: int, before: int) -> int:
@@ -190,8 +190,8 @@ class Table:
             if not line.strip(_BLANK):
                 blank = blank or number + i
             elif blank:
-                problem = "is blank, and rows follow; expected none in between"
-                raise Row(self.file, blank).invalid(problem)
+                fault = "is blank, and rows follow; expected none in between"
+                raise Row(self.file, blank).invalid(fault)
         return blank
 
     def _fast(self, lines: list[str]) -> FloatArray:
@@ -227,33 +227,33 @@ class Table:
             if place < len(words):
                 values.append(self._number(words[place], name, row))
         if len(words) != self._width:
-            problem = f"has {len(words)} values, expected {self._width}"
+            fault = f"has {len(words)} values, expected {self._width}"
             if self._between == "," and len(words) > self._width:
-                problem += "; decimal commas need semicolons between the values"
-            raise row.invalid(problem)
+                fault += "; decimal commas need semicolons between the values"
+            raise row.invalid(fault)
         return values
 
     def _number(self, word: str, name: str, row: Row) -> float:
         plain = word.replace(",", ".")
         for sign in ",.":
             if sign in word and (self._decimal or sign) != sign:
-                problem = (
+                fault = (
                     f"{name} is {word[:40]!r}, but numbers before it have a decimal "
                     f"{self._decimal!r}"
                 )
-                raise row.invalid(problem)
+                raise row.invalid(fault)
             if sign in word:
                 self._decimal = sign
         if not _NUMBER.fullmatch(plain):
             if plain.strip().lower().lstrip("+-") in ("nan", "inf", "infinity"):
-                problem = f"{name} is {word.strip()}, expected a finite number"
+                fault = f"{name} is {word.strip()}, expected a finite number"
             else:
-                problem = f"{name} is {word[:40]!r}, expected a number"
-            raise row.invalid(problem)
+                fault = f"{name} is {word[:40]!r}, expected a number"
+            raise row.invalid(fault)
         value = float(plain)
         if not math.isfinite(value):
-            problem = f"{name} is {word.strip()[:40]}, expected a finite number"
-            raise row.invalid(problem)
+            fault = f"{name} is {word.strip()[:40]}, expected a finite number"
+            raise row.invalid(fault)
         return value
 
 

@@ -60,9 +60,9 @@ class Waypoints:
         """Refuse the first row whose value in a column is not good."""
         if not good.all():
             row = int(np.argmin(good))
-            problem = f"{name} is {self[name][row]:g}, expected {expected}"
+            fault = f"{name} is {self[name][row]:g}, expected {expected}"
             where = f"line {row + 2}"
-            raise InvalidFile(file=self.file, where=where, problem=problem)
+            raise InvalidFile(file=self.file, where=where, fault=fault)
 
 
 def read_waypoints(table: Table) -> Waypoints:
@@ -242,19 +242,19 @@ def _smooth_columns(
     ]
     if not missing:
         return needed
-    problem = f"has no column {missing[0]!r}, which smooth pieces between the rows need"
+    fault = f"has no column {missing[0]!r}, which smooth pieces between the rows need"
     if interpolation == "auto":
-        problem += f" beside {next(n for n in names if n in found)!r}"
-    problem += "; --interpolation linear judges straight lines"
-    raise InvalidFile(file=file, where="line 1", problem=problem)
+        fault += f" beside {next(n for n in names if n in found)!r}"
+    fault += "; --interpolation linear judges straight lines"
+    raise InvalidFile(file=file, where="line 1", fault=fault)
 
 
 def _check_arm(file: Path, ignored: Sequence[str], arm: Manipulator) -> None:
     """Columns of joints that the arm has not are not to be left out."""
     for name in ignored:
         if _JOINT.fullmatch(name):
-            problem = f"has the column {name!r}, but the arm has {arm.n_links} links"
-            raise InvalidFile(file=file, where="line 1", problem=problem)
+            fault = f"has the column {name!r}, but the arm has {arm.n_links} links"
+            raise InvalidFile(file=file, where="line 1", fault=fault)
 
 
 def _check_values(rows: Waypoints) -> None:

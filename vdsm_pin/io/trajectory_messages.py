@@ -55,8 +55,8 @@ def of_message(data: Place) -> JointTrajectory:
         with multi.naming():
             return _together(one, other)
     if (found := one or other) is None:
-        problem = "is no trajectory: expected joint_names and points"
-        raise data.invalid(problem)
+        fault = "is no trajectory: expected joint_names and points"
+        raise data.invalid(fault)
     return found
 
 
@@ -72,8 +72,8 @@ def _found(data: Place) -> tuple[Place | None, Place | None]:
         data = next((data[key] for key in keys if key in data.value), data.get("goal"))
         if isinstance(data.value, list):  # of a DisplayTrajectory
             if (count := len(data.value)) != 1:
-                problem = f"has {count} trajectories, expected one"
-                raise data.invalid(problem)
+                fault = f"has {count} trajectories, expected one"
+                raise data.invalid(fault)
             data = data[0]
     return None, multi
 
@@ -82,15 +82,15 @@ def _points(message: Place) -> tuple[tuple[str, ...], list[Place]]:
     """Names of joints and points of a message."""
     names, points = (message.get(key) for key in ("joint_names", "points"))
     if not isinstance(names.value, list) or not points.value:
-        problem = "is no JointTrajectory: expected joint_names and points"
-        raise message.invalid(problem)
+        fault = "is no JointTrajectory: expected joint_names and points"
+        raise message.invalid(fault)
     for name in names.value:
         if not isinstance(name, str) or names.value.count(name) > 1:
-            problem = f"has {str(name)[:60]!r}, expected names that differ"
-            raise names.invalid(problem)
+            fault = f"has {str(name)[:60]!r}, expected names that differ"
+            raise names.invalid(fault)
     if len(found := points.items()) > MAX_ROWS:
-        problem = f"has more than {MAX_ROWS} points"
-        raise message.invalid(problem)
+        fault = f"has more than {MAX_ROWS} points"
+        raise message.invalid(fault)
     return tuple(names.value), found
 
 
@@ -101,8 +101,8 @@ def _single(message: Place) -> JointTrajectory:
         for key in ("positions", "velocities", "accelerations")
     )
     if q is None:
-        problem = "has no positions"
-        raise points[0].invalid(problem)
+        fault = "has no positions"
+        raise points[0].invalid(fault)
     times = _times(points)
     with message["points"].naming():
         return JointTrajectory(names, q, times, rates, changes)
@@ -133,8 +133,8 @@ def _seconds(time: Place) -> float:
         if isinstance(stated, dict) and stated and stated.keys() <= {*keys}:
             parts = [stated.get(key, 0) for key in keys]
     if (numbers := finite_numbers(parts, 2)) is None:
-        problem = f"is {str(stated)[:60]}, expected seconds"
-        raise time.invalid(problem)
+        fault = f"is {str(stated)[:60]}, expected seconds"
+        raise time.invalid(fault)
     return numbers[0] + _NANO * numbers[1]
 
 
@@ -152,20 +152,20 @@ def _multi(message: Place) -> JointTrajectory:
         if not isinstance(transforms.value, list) or len(transforms.value) != len(
             names
         ):
-            problem = f"expected one for each of {len(names)} joints"
-            raise transforms.invalid(problem)
+            fault = f"expected one for each of {len(names)} joints"
+            raise transforms.invalid(fault)
         rows[k] = [_transform(one) for one in transforms.items()]
         if point.get("velocities").value:
-            problem = "has velocities of joints of several degrees, expected none"
-            raise point.invalid(problem)
+            fault = "has velocities of joints of several degrees, expected none"
+            raise point.invalid(fault)
     rows[..., 3:] = np.unwrap(rows[..., 3:], axis=0)
     for column, name in enumerate(names):
         if not (np.ptp(rows[:, column, 4:], axis=0) <= TOLERANCES.still).all():
-            problem = (
+            fault = (
                 f"joint {name!r} turns about another axis than z between points, "
                 "expected one pitch and roll"
             )
-            raise message.invalid(problem)
+            raise message.invalid(fault)
     rows[..., 4:] = rows[:1, :, 4:]
     whole = tuple(f"{name}/{part}" for name in names for part in _FREE)
     return JointTrajectory(whole, rows.reshape(len(rows), -1), _times(points))
@@ -178,14 +178,14 @@ def _transform(transform: Place) -> FloatArray:
         place = transform.get(part)
         values = [place.get(key).value for key in keys]
         if (numbers := finite_numbers(values, len(keys))) is None:
-            problem = f"is {str(place.value)[:60]}, expected numbers {', '.join(keys)}"
-            raise place.invalid(problem)
+            fault = f"is {str(place.value)[:60]}, expected numbers {', '.join(keys)}"
+            raise place.invalid(fault)
         found += numbers
     quaternion = np.array(found[3:])
     length = float(np.linalg.norm(quaternion))
     if not abs(length - 1.0) <= TOLERANCES.quaternion:
-        problem = f"rotation has length {length:g}, expected 1"
-        raise transform.invalid(problem)
+        fault = f"rotation has length {length:g}, expected 1"
+        raise transform.invalid(fault)
     turn = rotation_from_quaternion(quaternion / length)
     yaw = np.arctan2(turn[1, 0], turn[0, 0])
     c, s = np.cos(yaw), np.sin(yaw)

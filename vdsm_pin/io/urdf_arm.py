@@ -122,11 +122,11 @@ class _Reading:
         rail, turning, end = joints[0], joints[1:-1], joints[-1]
         self._expect(rail, "prismatic", X)
         if len(turning) % 2:  # a chain has four at least
-            problem = (
+            fault = (
                 f"has {len(turning)} joints between the rail and the tip, expected two "
                 "revolutes for each of 2 or more links"
             )
-            raise InvalidFile(file=self.path, problem=problem)
+            raise InvalidFile(file=self.path, fault=fault)
         offsets = [self._offset(joint) for joint in (*turning, end)]
         for k, joint in enumerate(turning):
             self._expect(joint, "revolute", Y if k % 2 else Z)
@@ -157,21 +157,21 @@ class _Reading:
         while found := by_parent.get(link, []):
             if len(found) > 1:
                 names = ", ".join(joint.name for joint in found)
-                problem = f"link {link!r} carries {names}; expected one joint: a chain"
-                raise InvalidFile(file=self.path, problem=problem)
+                fault = f"link {link!r} carries {names}; expected one joint: a chain"
+                raise InvalidFile(file=self.path, fault=fault)
             chain.append(found[0])
             link = found[0].child
         if len(chain) < 6:
-            problem = f"has {len(chain)} joints in a row, expected a rail and 2 links"
-            raise InvalidFile(file=self.path, problem=problem)
+            fault = f"has {len(chain)} joints in a row, expected a rail and 2 links"
+            raise InvalidFile(file=self.path, fault=fault)
         return chain
 
     def _expect(self, joint: Any, kind: str, axis: FloatArray | None = None) -> None:
         if joint.type != kind:
             raise self._invalid(joint, f"is {joint.type}, expected {kind}")
         if joint.mimic is not None:
-            problem = f"mimics {joint.mimic.joint!r}, expected one that moves by itself"
-            raise self._invalid(joint, problem)
+            fault = f"mimics {joint.mimic.joint!r}, expected one that moves by itself"
+            raise self._invalid(joint, fault)
         if axis is not None and not np.array_equal(joint.axis, axis):
             wanted = " ".join(f"{value:g}" for value in axis)
             found = " ".join(f"{value:g}" for value in joint.axis)
@@ -194,10 +194,8 @@ class _Reading:
         for joint in turning:
             limits = float(joint.limit.lower), float(joint.limit.upper)
             if limits != (-first, first):
-                problem = (
-                    f"has limits {limits}, expected {(-first, first)} as the first"
-                )
-                raise self._invalid(joint, problem)
+                fault = f"has limits {limits}, expected {(-first, first)} as the first"
+                raise self._invalid(joint, fault)
         return first
 
     def _radius(self, reach: dict[str, float]) -> float:
@@ -212,16 +210,16 @@ class _Reading:
             for shape in link.collisions
         ]
         if not radii:
-            problem = "has no collision shape, so no body; expected spheres, cylinders"
-            raise InvalidFile(file=self.path, problem=problem)
+            fault = "has no collision shape, so no body; expected spheres, cylinders"
+            raise InvalidFile(file=self.path, fault=fault)
         return max(radii)
 
     def _radius_of(self, link: str, shape: Any, reach: float) -> float:
         """Radius of a sphere or cylinder on the axis of a link; [m]."""
         ball, rod = shape.geometry.sphere, shape.geometry.cylinder
         if ball is None and rod is None:
-            problem = "is neither a sphere nor a cylinder; a link here is a capsule"
-            raise self._bad_shape(link, problem)
+            fault = "is neither a sphere nor a cylinder; a link here is a capsule"
+            raise self._bad_shape(link, fault)
         pose = np.eye(4) if shape.origin is None else np.asarray(shape.origin)
         x, aside = float(pose[0, 3]), np.abs(pose[1:3, 3]).max()
         half = 0.0
@@ -230,15 +228,13 @@ class _Reading:
             aside = max(aside, np.abs(pose[1:3, 2]).max())  # a URDF cylinder is along z
         excess = max(float(aside), half - x, x + half - reach)
         if not excess <= TOLERANCES.arithmetic:
-            problem = f"is off the link's axis, from 0 to {reach:g} m along x"
-            raise self._bad_shape(link, problem)
+            fault = f"is off the link's axis, from 0 to {reach:g} m along x"
+            raise self._bad_shape(link, fault)
         return float((ball or rod).radius)
 
-    def _bad_shape(self, link: str, problem: str) -> InvalidFile:
+    def _bad_shape(self, link: str, fault: str) -> InvalidFile:
         where = f"link {link!r}"
-        return InvalidFile(file=self.path, where=where, problem=f"a shape {problem}")
+        return InvalidFile(file=self.path, where=where, fault=f"a shape {fault}")
 
-    def _invalid(self, joint: Any, problem: str) -> InvalidFile:
-        return InvalidFile(
-            file=self.path, where=f"joint {joint.name!r}", problem=problem
-        )
+    def _invalid(self, joint: Any, fault: str) -> InvalidFile:
+        return InvalidFile(file=self.path, where=f"joint {joint.name!r}", fault=fault)

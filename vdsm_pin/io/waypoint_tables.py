@@ -61,7 +61,7 @@ def read_centres(path: Path, problem: PlanningProblem) -> Trajectory:
     try:
         alpha, theta = joint_angles(arm, centres)
     except WrongLinkLength as error:
-        raise _bad_row(path, error.waypoint, error.problem) from None
+        raise _bad_row(path, error.waypoint, error.fault) from None
     place = table[:, 1] != 0.0, table[:, 2]
     return Trajectory(*place, centres[:, 0, 0], alpha, theta, notes)
 
@@ -83,7 +83,7 @@ def read_cables(path: Path, problem: PlanningProblem) -> Trajectory:
     try:
         alpha, theta = angles_from_cables(arm, np.ascontiguousarray(lengths))
     except InconsistentCables as error:
-        raise _bad_row(path, error.waypoint, error.problem) from None
+        raise _bad_row(path, error.waypoint, error.fault) from None
     place = table[:, 1] != 0.0, table[:, 2]
     return Trajectory(*place, table[:, 3], alpha, theta, notes)
 
@@ -103,5 +103,5 @@ def _read(path: Path, columns: tuple[str, ...]) -> tuple[FloatArray, tuple[str, 
     return rows, found.notes
 
 
-def _bad_row(path: Path, row: int, problem: str) -> InvalidFile:
-    return InvalidFile(file=path, where=f"line {row + 2}", problem=problem)
+def _bad_row(path: Path, row: int, fault: str) -> InvalidFile:
+    return InvalidFile(file=path, where=f"line {row + 2}", fault=fault)

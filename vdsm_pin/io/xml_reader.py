@@ -32,8 +32,8 @@ def read_xml(content: str | bytes, path: Path) -> ET.Element:
     try:
         return ET.fromstring(content)
     except (ET.ParseError, ValueError, LookupError) as error:
-        problem = f"is not XML: {' '.join(str(error).split())[:100]}"
-        raise InvalidFile(file=path, problem=problem) from None
+        fault = f"is not XML: {' '.join(str(error).split())[:100]}"
+        raise InvalidFile(file=path, fault=fault) from None
 
 
 def declared(text: str) -> str:

@@ -57,18 +57,18 @@ class YamlDocument:
     data: Data
     lines: dict[Location, int]
 
-    def invalid(self, at: Location, problem: str) -> InvalidFile:
+    def invalid(self, at: Location, fault: str) -> InvalidFile:
         """The error that names a value by its field and line."""
         line = self.line(at)
         where = spelled(at)
         if line is not None:
             where = f"{where} (line {line})" if where else f"line {line}"
-        return InvalidFile(file=self.file, where=where, problem=problem)
+        return InvalidFile(file=self.file, where=where, fault=fault)
 
     def invalid_file(self, at: Location, name: str, error: InvalidFile) -> InvalidFile:
         """The same of a value that names a file, with what is wrong in that."""
         place = f" {error.where}:" if error.where else ""
-        return self.invalid(at, f"{name!r}:{place} {error.problem}")
+        return self.invalid(at, f"{name!r}:{place} {error.fault}")
 
     @contextmanager
     def naming(self, at: Location) -> Iterator[None]:
@@ -118,14 +118,14 @@ def read_yaml(text: str, *, file: object) -> YamlDocument:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}" if mark else ""
-        problem = f"is not YAML: {error.problem or error.context}"
+        fault = f"is not YAML: {error.problem or error.context}"
         lines = plain.split("\n")[mark.line :] if mark else []
         if mark and lines and lines[0][mark.column :].startswith("\t"):
-            problem = "is not YAML: has a tab, expected spaces"
-        raise InvalidFile(file=file, where=where, problem=problem) from None
+            fault = "is not YAML: has a tab, expected spaces"
+        raise InvalidFile(file=file, where=where, fault=fault) from None
     except yaml.YAMLError as error:
-        problem = f"is not YAML: {' '.join(str(error).split())}"
-        raise InvalidFile(file=file, problem=problem) from None
+        fault = f"is not YAML: {' '.join(str(error).split())}"
+        raise InvalidFile(file=file, fault=fault) from None
 
 
 def _stand_ins(text: str) -> dict[int, str]:
@@ -156,13 +156,13 @@ class _Builder:
         next(self.events)  # the start of the stream
         start = next(self.events)
         if not isinstance(start, yaml.DocumentStartEvent):
-            raise InvalidFile(file=self.file, problem="holds no data")
+            raise InvalidFile(file=self.file, fault="holds no data")
         data = self._value(next(self.events), ())
         next(self.events)  # the end of the document
         while not isinstance(after := next(self.events), yaml.StreamEndEvent):
             if not _is_empty(next(self.events)):
-                problem = "a second document starts here, expected one"
-                raise self._invalid(after, problem)
+                fault = "a second document starts here, expected one"
+                raise self._invalid(after, fault)
             next(self.events)  # the end of the empty document
         return YamlDocument(self.file, data, self.lines)
 
@@ -182,12 +182,12 @@ class _Builder:
 
     def _value(self, event: yaml.Event, at: Location) -> Data:
         if isinstance(event, yaml.AliasEvent):
-            problem = f"is an alias (*{event.anchor}); write the value out"
-            raise self._invalid(event, problem)
+            fault = f"is an alias (*{event.anchor}); write the value out"
+            raise self._invalid(event, fault)
         assert isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent)
         if event.tag is not None:
-            problem = f"has the tag {event.tag!r}; a problem file holds plain data only"
-            raise self._invalid(event, problem)
+            fault = f"has the tag {event.tag!r}; a problem file holds plain data only"
+            raise self._invalid(event, fault)
         if self.lines.get(at[:-1]) != _line(event):
             self.lines.setdefault(at, _line(event))
         if isinstance(event, yaml.ScalarEvent):
@@ -214,9 +214,9 @@ class _Builder:
             data.append(self._value(item, (*at, len(data))))
         return data
 
-    def _invalid(self, event: yaml.Event, problem: str) -> InvalidFile:
+    def _invalid(self, event: yaml.Event, fault: str) -> InvalidFile:
         line = _line(event)
-        return InvalidFile(file=self.file, where=f"line {line}", problem=problem)
+        return InvalidFile(file=self.file, where=f"line {line}", fault=fault)
 
 
 def _scalar(text: str) -> Scalar:

@@ -144,11 +144,11 @@ def _rows(folder: Path) -> dict[str, BatchRow]:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"]) or "content"
-        problem = f"{key}: {first['msg']}; was it written by this version of vdsm?"
-        raise InvalidFile(file=folder, problem=problem) from error
+        fault = f"{key}: {first['msg']}; was it written by this version of vdsm?"
+        raise InvalidFile(file=folder, fault=fault) from error
     except (OSError, ValueError, csv.Error) as error:
-        raise InvalidFile(file=folder, problem=f"cannot be read: {error}") from error
+        raise InvalidFile(file=folder, fault=f"cannot be read: {error}") from error
     if folder.is_file():
-        raise InvalidFile(file=folder, problem="is a file, expected a folder")
+        raise InvalidFile(file=folder, fault="is a file, expected a folder")
     what = "holds neither summary.csv nor verification.json"
-    raise InvalidFile(file=folder, problem=what)
+    raise InvalidFile(file=folder, fault=what)

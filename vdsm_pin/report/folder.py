@@ -35,9 +35,9 @@ def check_output_folder(folder: Path) -> None:
     while not nearest.exists() and nearest != nearest.parent:
         nearest = nearest.parent
     if not nearest.is_dir():
-        raise InvalidFile(file=nearest, problem="is a file, expected a folder")
+        raise InvalidFile(file=nearest, fault="is a file, expected a folder")
     if not os.access(nearest, os.W_OK | os.X_OK):
-        raise InvalidFile(file=nearest, problem="is not writable")
+        raise InvalidFile(file=nearest, fault="is not writable")
 
 
 def check_ending(path: Path, *endings: str) -> None:
@@ -48,7 +48,7 @@ def check_ending(path: Path, *endings: str) -> None:
     """
     if path.suffix.lower() not in endings:
         known = ", ".join(ending or "no ending" for ending in endings)
-        raise InvalidFile(file=path, problem=f"ends in none of {known}")
+        raise InvalidFile(file=path, fault=f"ends in none of {known}")
 
 
 def check_output_file(path: Path) -> None:
@@ -112,14 +112,14 @@ def check_kept(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
         check_replaceable(output)
         first = places.setdefault(os.path.realpath(output), output)
         if first is not output:
-            problem = f"is where {first} goes too; nothing was written"
-            raise InvalidFile(file=output, problem=problem)
+            fault = f"is where {first} goes too; nothing was written"
+            raise InvalidFile(file=output, fault=fault)
     there = {identity(output): output for output in outputs}
     for one in inputs:
         known = identity(one)
         if known is not None and known in there:
-            problem = f"is an input, read as {one}; nothing was written"
-            raise InvalidFile(file=there[known], problem=problem)
+            fault = f"is an input, read as {one}; nothing was written"
+            raise InvalidFile(file=there[known], fault=fault)
 
 
 def identity(path: Path) -> tuple[int, int] | None:

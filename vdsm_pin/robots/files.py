@@ -278,8 +278,8 @@ def cell_file(file: ProblemDocument) -> CellFile:
     """
     path, document, data = file.path, file.yaml, file.yaml.data
     if isinstance(data, dict) and "manipulator" in data and "robot" not in data:
-        problem = "is of a snake arm, which read_problem reads; expected robot"
-        raise InvalidFile(file=path, where="manipulator", problem=problem)
+        fault = "is of a snake arm, which read_problem reads; expected robot"
+        raise InvalidFile(file=path, where="manipulator", fault=fault)
     return CellFile(path, document, checked(document, CellModel))
 
 

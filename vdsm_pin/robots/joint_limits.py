@@ -151,8 +151,8 @@ def _limits(joint: Place) -> Limits:
     if _has(joint, "position"):
         low, high = joint["min_position"].number(), joint["max_position"].number()
         if not low <= high:
-            problem = f"has min_position {low:g} above max_position {high:g}"
-            raise joint.invalid(problem)
+            fault = f"has min_position {low:g} above max_position {high:g}"
+            raise joint.invalid(fault)
         found = replace(found, lower=low, upper=high)
     return found
 
@@ -163,8 +163,8 @@ def _most(joint: Place, kind: str) -> float:
         return np.inf
     most = joint[f"max_{kind}"]
     if not most.number() > 0.0:
-        problem = f"is {most.value}, expected above 0"
-        raise most.invalid(problem)
+        fault = f"is {most.value}, expected above 0"
+        raise most.invalid(fault)
     return most.number()
 
 
@@ -172,6 +172,6 @@ def _has(joint: Place, kind: str) -> bool:
     """Whether limits of a kind are stated; `yes` and 1 are neither true nor false."""
     has = joint.get(f"has_{kind}_limits", default=False)
     if not isinstance(has.value, bool):
-        problem = f"is {has.value!r}, expected true or false"
-        raise has.invalid(problem)
+        fault = f"is {has.value!r}, expected true or false"
+        raise has.invalid(fault)
     return has.value

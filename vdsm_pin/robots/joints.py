@@ -94,9 +94,9 @@ class JointReader:
     notes: list[str] = field(default_factory=list)
     _values: dict[str, _Value] = field(default_factory=dict)
 
-    def invalid(self, problem: str) -> InvalidFile:
+    def invalid(self, fault: str) -> InvalidFile:
         """The URDF is not what is expected."""
-        return InvalidFile(file=self.path, problem=problem)
+        return InvalidFile(file=self.path, fault=fault)
 
     def read(self, document: ET.Element) -> None:
         """All joints, parents first; those that others mimic before them by name."""
@@ -157,13 +157,13 @@ class JointReader:
         unknown = self.moving.lock.keys() - known - own.keys()
         if unknown:
             words = ", ".join(sorted(known)) or "none"
-            problem = f"has no joint {min(unknown)!r} to lock; known: {words}"
-            raise self.invalid(problem)
+            fault = f"has no joint {min(unknown)!r} to lock; known: {words}"
+            raise self.invalid(fault)
         for name, parts in own.items():
             if len(parts) > 1 and self.moving.lock.get(name, 0.0) != 0.0:
                 words = ", ".join(name + part.suffix for part in parts)
-                problem = f"joint {name!r} has several values; lock {words}, or it at 0"
-                raise self.invalid(problem)
+                fault = f"joint {name!r} has several values; lock {words}, or it at 0"
+                raise self.invalid(fault)
 
     def _read_values(self, elements: list[ET.Element]) -> None:
         """Column, ratio and offset of each joint's value."""
@@ -183,11 +183,11 @@ class JointReader:
             self._keep(joint.get("name", ""), self._following(joint))
         for name, leader in zip(names, leaders, strict=True):
             if name not in self._values:
-                problem = (
+                fault = (
                     f"joint {name!r} mimics {leader!r}, which is no joint of one value "
                     "or mimics it in turn"
                 )
-                raise self.invalid(problem)
+                raise self.invalid(fault)
 
     def _following(self, joint: ET.Element) -> _Value:
         mimic = joint.find("mimic")
@@ -221,8 +221,8 @@ class JointReader:
     def _keep(self, name: str, value: _Value) -> None:
         """Take down a joint's value, or that of a part of it."""
         if name in self._values:
-            problem = f"two joints have the value {name!r}, expected names that differ"
-            raise self.invalid(problem)
+            fault = f"two joints have the value {name!r}, expected names that differ"
+            raise self.invalid(fault)
         self._values[name] = value
 
     def _standing(self, joint: str, name: str, limits: Limits) -> _Value | None:
@@ -235,9 +235,9 @@ class JointReader:
         else:
             return None
         if not limits.lower <= value <= limits.upper:
-            problem = f"joint {name!r} {why} {value:g}, outside of its limits "
-            problem += f"{limits.lower:g} to {limits.upper:g}; say where with lock"
-            raise self.invalid(problem)
+            fault = f"joint {name!r} {why} {value:g}, outside of its limits "
+            fault += f"{limits.lower:g} to {limits.upper:g}; say where with lock"
+            raise self.invalid(fault)
         self.notes.append(f"joint {name!r} {why} {value:g}")
         return _Value(None, 1.0, value)
 
@@ -245,8 +245,8 @@ class JointReader:
         word = element.get(name)
         value = default if word is None else plain_number(word)
         if not abs(value) < LARGEST:
-            problem = f"<{element.tag}> has {name}={word!r}, expected a finite number"
-            raise self.invalid(problem)
+            fault = f"<{element.tag}> has {name}={word!r}, expected a finite number"
+            raise self.invalid(fault)
         return value
 
 

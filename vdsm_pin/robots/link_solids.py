@@ -132,17 +132,17 @@ class LinkReader:
         scale = np.array([plain_number(w) for w in shape.get("scale", "1 1 1").split()])
         if scale.shape != (3,) or not (np.isfinite(scale) & (scale != 0.0)).all():
             word = shape.get("scale")
-            problem = f"scale is {word!r}, expected 3 numbers that are not 0"
-            raise self._invalid(link, problem)
+            fault = f"scale is {word!r}, expected 3 numbers that are not 0"
+            raise self._invalid(link, fault)
         metres = 1.0 if mesh.unit is None else mesh.unit  # COLLADA states its own
         points: FloatArray = metres * mesh.vertices * scale
         size = float(np.ptp(points, axis=0).max())
         if not size <= LARGEST_LINK:
-            problem = (
+            fault = (
                 f"its mesh {name!r} is {size:.4g} m large; is it in "
                 'millimetres? expected scale="0.001 0.001 0.001"'
             )
-            raise self._invalid(link, problem)
+            raise self._invalid(link, fault)
         self._sizes.append((link, name, size))
         if size < SMALLEST_LINK:
             odd = f"its mesh {name!r} is {MM_PER_M * size:.3g} mm large"
@@ -155,9 +155,9 @@ class LinkReader:
             how = "say where with --package-dir"
             if "$(" in name:
                 how = "expected no $( ), but in xacro files, which end in .xacro"
-            problem = f"mesh {name!r} is not found; {how}"
-            raise self._invalid(link, problem)
+            fault = f"mesh {name!r} is not found; {how}"
+            raise self._invalid(link, fault)
         return found
 
-    def _invalid(self, link: str, problem: str) -> InvalidFile:
-        return InvalidFile(file=self.path, problem=f"link {link!r}: {problem}")
+    def _invalid(self, link: str, fault: str) -> InvalidFile:
+        return InvalidFile(file=self.path, fault=f"link {link!r}: {fault}")

@@ -25,12 +25,12 @@ def read_mjcf(file: Path) -> tuple[Scene, tuple[Path, ...]]:
             or is of another type than plane, sphere, capsule, cylinder and box.
     """
     if find_spec("mujoco") is None:
-        problem = "MJCF needs mujoco: pip install 'vdsm-pin[mjcf]'"
-        raise InvalidFile(file=file, problem=problem)
+        fault = "MJCF needs mujoco: pip install 'vdsm-pin[mjcf]'"
+        raise InvalidFile(file=file, fault=fault)
     check_is_file(file)
     if not _is_text(str(file)):
-        problem = "has a name that is not UTF-8 text, which mujoco does not open"
-        raise InvalidFile(file=file, problem=problem)
+        fault = "has a name that is not UTF-8 text, which mujoco does not open"
+        raise InvalidFile(file=file, fault=fault)
     included = check_size(file)
     with naming_file(file):
         return Scene(tuple(_solids(file))), included
@@ -67,11 +67,11 @@ def _solids(file: Path) -> list[Obstacle]:
         ]
     # What it cannot hold in memory, and names that are no text, end in other errors.
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
-        problem = f"is refused by mujoco: {' '.join(str(error).split())[:200]}"
-        raise InvalidFile(file=file, problem=problem) from None
+        fault = f"is refused by mujoco: {' '.join(str(error).split())[:200]}"
+        raise InvalidFile(file=file, fault=fault) from None
     if model.nflex:
-        problem = "has a flex, which bends, expected a world that stands still"
-        raise InvalidFile(file=file, problem=problem)
+        fault = "has a flex, which bends, expected a world that stands still"
+        raise InvalidFile(file=file, fault=fault)
     paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
     return [
         _solid(file, model, data, k, names[k])
@@ -86,8 +86,8 @@ def _solid(file: Path, model: Any, data: Any, k: int, name: str | None) -> Obsta
     kind = mujoco.mjtGeom(model.geom_type[k]).name.removeprefix("mjGEOM_").lower()
     name = name or f"{kind} {k}"
     if model.body_weldid[model.geom_bodyid[k]] != 0:
-        problem = f"geom {name!r} rides on a joint, expected a world that stands still"
-        raise InvalidFile(file=file, problem=problem)
+        fault = f"geom {name!r} rides on a joint, expected a world that stands still"
+        raise InvalidFile(file=file, fault=fault)
     centre, size = np.array(data.geom_xpos[k]), np.array(model.geom_size[k])
     turn = np.array(data.geom_xmat[k]).reshape(3, 3)
     match kind:
@@ -101,10 +101,10 @@ def _solid(file: Path, model: Any, data: Any, k: int, name: str | None) -> Obsta
             return Cylinder(name, centre, turn[:, 2], float(size[1]), float(size[0]))
         case "box":
             return Box(name, centre, turn, size)
-    problem = (
+    fault = (
         f"geom {name!r} is a {kind}, expected plane, sphere, capsule, cylinder or box"
     )
-    raise InvalidFile(file=file, problem=problem)
+    raise InvalidFile(file=file, fault=fault)
 
 
 MAX_BYTES: Final = 64 << 20
@@ -132,11 +132,11 @@ def check_size(file: Path) -> tuple[Path, ...]:
     seen: dict[Path, None] = {}
     count = _elements(file, file.parent, seen, 0)
     if not count <= MOST:
-        problem = (
+        fault = (
             f"has {count:.6g} elements, each counted as often as `replicate` and the "
             f"like repeat it, expected at most {MOST}"
         )
-        raise InvalidFile(file=file, problem=problem)
+        raise InvalidFile(file=file, fault=fault)
     return tuple(seen)[1:]
 
 
@@ -155,8 +155,8 @@ def _elements(file: Path, folder: Path, seen: dict[Path, None], depth: int) -> f
     if file in seen or not file.is_file():  # which mujoco tells
         return 0.0
     if depth > DEEPEST:
-        problem = f"is included by {depth} files, one within another"
-        raise InvalidFile(file=file, problem=f"{problem}, expected {DEEPEST} at most")
+        fault = f"is included by {depth} files, one within another"
+        raise InvalidFile(file=file, fault=f"{fault}, expected {DEEPEST} at most")
     seen[file] = None
     root = read_xml(read_bytes(file, limit=MAX_BYTES), file)
 

@@ -92,14 +92,14 @@ def _moveit(document: YamlDocument, links: Collection[str], robot_size: float) -
     whole = Place(document, (), document.data)
     attached = whole.get("robot_state", {}).get("attached_collision_objects", [])
     if attached.value:
-        problem = "has attached objects, which are not judged yet"
-        raise attached.invalid(problem)
+        fault = "has attached objects, which are not judged yet"
+        raise attached.invalid(fault)
     if whole["world"].get("octomap", {}).get("octomap", {}).get("data", []).value:
-        problem = "has an octomap, which is not read"
-        raise whole["world"].invalid(problem)
+        fault = "has an octomap, which is not read"
+        raise whole["world"].invalid(fault)
     if whole.get("is_diff", default=False).value:
-        problem = "is what changes in a scene, expected a whole one (is_diff: false)"
-        raise whole["is_diff"].invalid(problem)
+        fault = "is what changes in a scene, expected a whole one (is_diff: false)"
+        raise whole["is_diff"].invalid(fault)
     found: list[Obstacle] = []
     things = whole["world"].get("collision_objects", []).items()
     _check_frames(things, links, whole.get("fixed_frame_transforms", []).items())
@@ -135,8 +135,8 @@ def _check_frames(
     for thing, frame in frames:
         one = str(frame.value)
         if frame.value != frames[0][1].value or one.lstrip("/") in elsewhere:
-            problem = f"is in the frame {one[:60]!r}, expected that of the root link"
-            raise thing.invalid(problem)
+            fault = f"is in the frame {one[:60]!r}, expected that of the root link"
+            raise thing.invalid(fault)
 
 
 def _stands_aside(placed: Place) -> bool:
@@ -150,20 +150,20 @@ def _stands_aside(placed: Place) -> bool:
 def _solids(thing: Place) -> list[Obstacle]:
     name = thing["id"].value
     if not isinstance(name, str) or not name:
-        problem = "is no name"
-        raise thing["id"].invalid(problem)
+        fault = "is no name"
+        raise thing["id"].invalid(fault)
     base, shapes = _pose(thing.get("pose", {})), list[tuple[Reader, Place, Place]]()
     for kind, plural, reader in KINDS:
         some = thing.get(plural, []).items()
         poses = thing.get(f"{kind}_poses", []).items()
         if len(some) != len(poses):
-            problem = f"{name!r} has not one pose for each of its {plural}"
-            raise thing.invalid(problem)
+            fault = f"{name!r} has not one pose for each of its {plural}"
+            raise thing.invalid(fault)
         shapes += [(reader, *both) for both in zip(some, poses, strict=True)]
     count = len(shapes)
     if not count:
-        problem = f"{name!r} has no shape"
-        raise thing.invalid(problem)
+        fault = f"{name!r} has no shape"
+        raise thing.invalid(fault)
     names = [name if count == 1 else f"{name}/{k}" for k in range(1, count + 1)]
     found = list[Obstacle]()
     for one, (reader, shape, pose) in zip(names, shapes, strict=True):
@@ -186,8 +186,8 @@ def _primitive(shape: Place, name: str, placement: FloatArray) -> Obstacle:
         case "cylinder":
             height, radius = sizes.numbers(2).tolist()
             return Cylinder(name, centre, turn[:, 2], height / 2.0, radius)
-    problem = f"is {kind!r}, expected {', '.join(kinds.values())}"
-    raise shape["type"].invalid(problem)
+    fault = f"is {kind!r}, expected {', '.join(kinds.values())}"
+    raise shape["type"].invalid(fault)
 
 
 def _plane(plane: Place, name: str, placement: FloatArray) -> Obstacle:
@@ -195,8 +195,8 @@ def _plane(plane: Place, name: str, placement: FloatArray) -> Obstacle:
     a, b, c, d = plane["coef"].numbers(4)
     length = float(np.linalg.norm((a, b, c)))
     if not length > 0.0:
-        problem = "has no direction"
-        raise plane.invalid(problem)
+        fault = "has no direction"
+        raise plane.invalid(fault)
     normal = placement[:3, :3] @ (np.array([a, b, c]) / length)
     foot = placement[:3, 3] - d / length * normal
     return HalfSpace(name, foot, normal)
@@ -216,8 +216,8 @@ def _triangle(triangle: Place, count: int) -> FloatArray:
     place = triangle["vertex_indices"] if named else triangle
     found = place.numbers(3)
     if not ((found >= 0) & (found < count) & (found % 1 == 0)).all():
-        problem = f"is {found.tolist()}, expected three numbers of {count} vertices"
-        raise place.invalid(problem)
+        fault = f"is {found.tolist()}, expected three numbers of {count} vertices"
+        raise place.invalid(fault)
     return found
 
 
@@ -236,8 +236,8 @@ def _pose(pose: Place) -> FloatArray:
     quaternion = _named(pose.get("orientation", [0, 0, 0, 1]), "xyzw")
     length = float(np.linalg.norm(quaternion))
     if not abs(length - 1.0) <= TOLERANCES.quaternion:
-        problem = f"has an orientation of length {length:g}, expected 1"
-        raise pose.invalid(problem)
+        fault = f"has an orientation of length {length:g}, expected 1"
+        raise pose.invalid(fault)
     placement[:3, :3] = rotation_from_quaternion(quaternion / length)
     return placement
 

@@ -37,8 +37,8 @@ class _Words:
         """The next word."""
         found = next(self._words, None)
         if found is None:
-            problem = f"the file ends, expected {expected}"
-            raise self.invalid(problem)
+            fault = f"the file ends, expected {expected}"
+            raise self.invalid(fault)
         self.line, word = found
         return word
 
@@ -49,23 +49,23 @@ class _Words:
             word = self.next("a number")
             found.append(plain_number(word))
             if isnan(found[-1]):
-                problem = f"is {word[:40]!r}, expected a number"
-                raise self.invalid(problem)
+                fault = f"is {word[:40]!r}, expected a number"
+                raise self.invalid(fault)
         return found
 
     def count(self, what: str) -> int:
         """The next whole number."""
         word = self.next(f"a number of {what}")
         if not word.isdecimal() or len(word) > len(str(MOST)) or int(word) > MOST:
-            problem = f"is {word[:40]!r}, expected a number of {what}"
-            raise self.invalid(problem)
+            fault = f"is {word[:40]!r}, expected a number of {what}"
+            raise self.invalid(fault)
         return int(word)
 
     def check_end(self) -> None:
         """Refuse words behind the end of the scene."""
         for number, word in self._words:
-            self.line, problem = number, f"is {word!r}, expected nothing behind '.'"
-            raise self.invalid(problem)
+            self.line, fault = number, f"is {word!r}, expected nothing behind '.'"
+            raise self.invalid(fault)
 
     def has_poses(self) -> bool:
         """Whether objects have a pose of their own, by the line after a name."""
@@ -76,10 +76,10 @@ class _Words:
             after = line.startswith("*")
         return False
 
-    def invalid(self, problem: str) -> InvalidFile:
+    def invalid(self, fault: str) -> InvalidFile:
         """A word is not what is expected."""
         where = f"line {self.line}"
-        return InvalidFile(file=self._file, where=where, problem=problem)
+        return InvalidFile(file=self._file, where=where, fault=fault)
 
 
 def read_scene_text(file: Path, text: str) -> YamlDocument:
@@ -94,8 +94,8 @@ def read_scene_text(file: Path, text: str) -> YamlDocument:
     lines: dict[Location, int] = {(): 1}
     while (marker := words.next("* or .")) != ".":
         if marker != "*":
-            problem = f"is {marker!r}, expected * or ."
-            raise words.invalid(problem)
+            fault = f"is {marker!r}, expected * or ."
+            raise words.invalid(fault)
         at: Location = ("world", "collision_objects", len(things))
         thing = _thing(words, with_pose)
         lines[at] = words.line
@@ -131,8 +131,8 @@ def _shape(words: _Words, kind: str) -> tuple[str, str, dict[str, Any]]:
         return "meshes", "mesh_poses", {"vertices": vertices, "triangles": triangles}
     if kind not in SIZES:
         known = ", ".join((*SIZES, "mesh"))
-        problem = f"is the shape {kind!r}, expected one of {known}"
-        raise words.invalid(problem)
+        fault = f"is the shape {kind!r}, expected one of {known}"
+        raise words.invalid(fault)
     sizes = words.numbers(SIZES[kind])
     if kind == "plane":
         return "planes", "plane_poses", {"coef": sizes}

@@ -45,19 +45,19 @@ class Srdf:
         self._path = path
         self._root = read_xml(read_text(path, limit=MAX_BYTES), path)
         if self._root.tag != "robot":
-            problem = f"root element is <{self._root.tag}>, expected <robot>"
-            raise self._invalid(problem)
+            fault = f"root element is <{self._root.tag}>, expected <robot>"
+            raise self._invalid(fault)
         if self._root.find("joint/parent") is not None:
-            problem = "is a URDF, with joints between links; expected a SRDF"
-            raise self._invalid(problem)
+            fault = "is a URDF, with joints between links; expected a SRDF"
+            raise self._invalid(fault)
         self._links = {link.get("name", "") for link in robot.findall("link")}
         self._joints = {
             joint.get("name", ""): joint for joint in robot.findall("joint")
         }
         self._joint_of = {end(j, "child"): n for n, j in self._joints.items()}
 
-    def _invalid(self, problem: str) -> InvalidFile:
-        return InvalidFile(file=self._path, problem=problem)
+    def _invalid(self, fault: str) -> InvalidFile:
+        return InvalidFile(file=self._path, fault=fault)
 
     def disabled(self) -> dict[frozenset[str], str]:
         """Pairs of links that it does not hold apart, with its reason."""
@@ -90,15 +90,15 @@ class Srdf:
                 continue
             where = f"virtual_joint {name!r}"
             if kind not in ("planar", "floating"):
-                problem = f"{where}: type {kind!r}, expected fixed, planar or floating"
-                raise self._invalid(problem)
+                fault = f"{where}: type {kind!r}, expected fixed, planar or floating"
+                raise self._invalid(fault)
             child = element.get("child_link", "")
             if child not in self._links or child in self._joint_of:
-                problem = f"{where}: child_link {child!r} is not the root link"
-                raise self._invalid(problem)
+                fault = f"{where}: child_link {child!r} is not the root link"
+                raise self._invalid(fault)
             if not name or name in self._joints:
-                problem = f"{where}: expected a name that no joint has"
-                raise self._invalid(problem)
+                fault = f"{where}: expected a name that no joint has"
+                raise self._invalid(fault)
             return Base(name, cast("BaseKind", kind))
         return None
 
@@ -115,15 +115,15 @@ class Srdf:
                 continue
             if one not in groups:
                 known = ", ".join(groups) or "none"
-                problem = f"has no group {one!r}; known: {known}"
-                raise self._invalid(problem)
+                fault = f"has no group {one!r}; known: {known}"
+                raise self._invalid(fault)
             parts[one] = [part.get("name", "") for part in groups[one].findall("group")]
             left += parts[one]
         try:
             TopologicalSorter(parts).prepare()
         except CycleError as error:
-            problem = f"group {error.args[1][0]!r} is a part of itself"
-            raise self._invalid(problem) from None
+            fault = f"group {error.args[1][0]!r} is a part of itself"
+            raise self._invalid(fault) from None
         return frozenset(j for one in parts for j in self._joints_in(groups[one]))
 
     def _joints_in(self, group: ET.Element) -> Iterator[str]:
@@ -143,14 +143,14 @@ class Srdf:
     def _joint(self, name: str, where: str) -> str:
         virtual = {v.get("name", "") for v in self._root.findall("virtual_joint")}
         if name not in self._joints and name not in virtual:
-            problem = f"{where} names joint {name!r}, which the URDF lacks"
-            raise self._invalid(problem)
+            fault = f"{where} names joint {name!r}, which the URDF lacks"
+            raise self._invalid(fault)
         return name
 
     def _link(self, name: str, where: str) -> str:
         if name not in self._links:
-            problem = f"{where} names link {name!r}, which the URDF lacks"
-            raise self._invalid(problem)
+            fault = f"{where} names link {name!r}, which the URDF lacks"
+            raise self._invalid(fault)
         return name
 
     def _chain(self, chain: ET.Element, where: str) -> set[str]:
@@ -160,8 +160,8 @@ class Srdf:
         found = set()
         while link != first:
             if link not in self._joint_of:
-                problem = f"{where}: no chain leads from {first!r} to {tip!r}"
-                raise self._invalid(problem)
+                fault = f"{where}: no chain leads from {first!r} to {tip!r}"
+                raise self._invalid(fault)
             joint = self._joint_of[link]
             found.add(joint)
             link = end(self._joints[joint], "parent")

@@ -49,12 +49,12 @@ def _read(
     others = [one for one in stated if one in values and one not in known]
     smooth = [_smooth_columns(file, names, joints, *w) for w in (RATES, CHANGES)]
     if smooth[1] and not smooth[0]:
-        problem = "has accelerations, expected velocities too"
-        raise InvalidFile(file=file, where="line 1", problem=problem)
+        fault = "has accelerations, expected velocities too"
+        raise InvalidFile(file=file, where="line 1", fault=fault)
     times = [TIME] if TIME in names else []
     if smooth[0] and not times:
-        problem = f"has velocities, expected {TIME} too"
-        raise InvalidFile(file=file, where="line 1", problem=problem)
+        fault = f"has velocities, expected {TIME} too"
+        raise InvalidFile(file=file, where="line 1", fault=fault)
     wanted = [*columns, *times, *smooth[0], *smooth[1]]
     more = [stated[one][0] for one in others]
     table.choose([*wanted, *more])
@@ -89,8 +89,8 @@ def _check_once(file: File, names: Sequence[str], stated: Stated) -> None:
     """Refuse a second column of a joint, in another unit."""
     for name in names:
         if (m := _COLUMN.fullmatch(name)) and stated[m[1]][0] != name:
-            problem = f"has {name!r} and {stated[m[1]][0]!r}, expected one of them"
-            raise InvalidFile(file=file, where="line 1", problem=problem)
+            fault = f"has {name!r} and {stated[m[1]][0]!r}, expected one of them"
+            raise InvalidFile(file=file, where="line 1", fault=fault)
 
 
 def _position_columns(
@@ -100,12 +100,12 @@ def _position_columns(
     columns, factors = [], []
     for joint in joints:
         if joint.name not in named:
-            problem = (
+            fault = (
                 f"has no column for joint {joint.name!r}, expected "
                 f"{joint.name}_{joint.unit}; or state where it stands: `lock` in the "
                 "problem file, --lock beside --urdf"
             )
-            raise InvalidFile(file=file, where="line 1", problem=problem)
+            raise InvalidFile(file=file, where="line 1", fault=fault)
         name, unit = named[joint.name]
         _check_kind(file, name, unit, joint)
         columns.append(name)
@@ -117,8 +117,8 @@ def _check_kind(file: File, name: str, unit: str, joint: RobotJoint) -> None:
     """Refuse lengths of a joint that turns, and angles of one that slides."""
     if (unit in ("rad", "deg")) != joint.turns:
         expected = "_rad or _deg" if joint.turns else "_m or _mm"
-        problem = f"has the column {name!r}, expected {expected} for this joint"
-        raise InvalidFile(file=file, where="line 1", problem=problem)
+        fault = f"has the column {name!r}, expected {expected} for this joint"
+        raise InvalidFile(file=file, where="line 1", fault=fault)
 
 
 def _smooth_columns(
@@ -130,15 +130,15 @@ def _smooth_columns(
         m = _SMOOTH.fullmatch(name)
         if m and (m[2], m[4]) == (what, per):
             if m[1] in found:
-                problem = f"has {name!r} and {found[m[1]][0]!r}, expected one of them"
-                raise InvalidFile(file=file, where="line 1", problem=problem)
+                fault = f"has {name!r} and {found[m[1]][0]!r}, expected one of them"
+                raise InvalidFile(file=file, where="line 1", fault=fault)
             found[m[1]] = name, m[3]
     mine = [joint for joint in joints if joint.name in found]
     for joint in joints if mine else []:
         if joint.name not in found:
             expected = f"{joint.name}_{what}_{joint.unit}_{per}"
-            problem = f"has no column {expected}, but one for {mine[0].name!r}"
-            raise InvalidFile(file=file, where="line 1", problem=problem)
+            fault = f"has no column {expected}, but one for {mine[0].name!r}"
+            raise InvalidFile(file=file, where="line 1", fault=fault)
         _check_kind(file, *found[joint.name], joint)
     return [found[joint.name][0] for joint in joints] if mine else []
 
@@ -150,11 +150,11 @@ def _check_degrees(file: File, table: FloatArray, columns: Sequence[str]) -> Non
         return
     most = float(np.abs(table[:, angles]).max())
     if most <= np.pi and (np.abs(table[:, angles]) % 1.0 > 0.0).any():
-        problem = (
+        fault = (
             f"its columns in degrees stay within {most:.4g}, which is at most pi: they "
             "look like radians; expected _rad, also for degrees as small as these"
         )
-        raise InvalidFile(file=file, problem=problem)
+        raise InvalidFile(file=file, fault=fault)
 
 
 def csv_text(motion: JointTrajectory, robot: Robot) -> str:

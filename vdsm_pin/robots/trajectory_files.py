@@ -107,11 +107,11 @@ def _agree(
         held, follows = TOLERANCES.held_joint, TOLERANCES.mimicked_joint
         if not off[row] <= (held if column is None else follows):
             why = "stands still" if column is None else "mimics another"
-            problem = (
+            fault = (
                 f"has joint {name!r} at {stated[row]:.6g} at waypoint {row}, but it "
                 f"{why} and is judged at {judged[row]:.6g}"
             )
-            raise InvalidFile(file=file, problem=problem)
+            raise InvalidFile(file=file, fault=fault)
         if off[row] > TOLERANCES.still:
             yield f"joint {name!r} is up to {off[row]:.2g} off where it is judged"
 
@@ -146,7 +146,7 @@ def joint_path(file: File, motion: JointTrajectory) -> "Path":
     try:
         return motion.path
     except ValueError as error:
-        raise InvalidFile(file=file, problem=str(error)) from None
+        raise InvalidFile(file=file, fault=str(error)) from None
 
 
 def _check_times(file: File, times: FloatArray | None) -> None:
@@ -155,10 +155,10 @@ def _check_times(file: File, times: FloatArray | None) -> None:
     if times is None or rises.all():
         return
     row = int(np.argmin(rises)) + 1
-    problem = f"time is {times[row]:.12g} s after {times[row - 1]:.12g} s, expected it "
-    problem += "to rise from row to row"
+    fault = f"time is {times[row]:.12g} s after {times[row - 1]:.12g} s, expected it "
+    fault += "to rise from row to row"
     where = f"points[{row}]" if _has_points(file) else f"line {row + 2}"
-    raise InvalidFile(file=file, where=where, problem=problem)
+    raise InvalidFile(file=file, where=where, fault=fault)
 
 
 def _has_points(file: File) -> bool:
@@ -181,14 +181,14 @@ def _of_joints(
         if f"{joint}/theta" not in named or name in named:
             continue
         if part != "yaw" and not (np.abs(motion.q[:, k]) <= TOLERANCES.still).all():
-            problem = f"joint {joint!r} is planar, expected {part} 0"
-            raise InvalidFile(file=file, problem=problem)
+            fault = f"joint {joint!r} is planar, expected {part} 0"
+            raise InvalidFile(file=file, fault=fault)
         if part == "yaw":
             names[k] = f"{joint}/theta"
     missing = [joint.name for joint in joints if joint.name not in names]
     if missing:
-        problem = f"has no joint {missing[0]!r}; state its value with --lock"
-        raise InvalidFile(file=file, where="joint_names", problem=problem)
+        fault = f"has no joint {missing[0]!r}; state its value with --lock"
+        raise InvalidFile(file=file, where="joint_names", fault=fault)
     wanted = [joint.name for joint in joints]
     return replace(motion, names=tuple(names)).of(wanted)
 
@@ -201,9 +201,9 @@ def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> Non
             limits = np.isfinite([joint.lower, joint.upper]).any()
             row = int(np.argmax(np.abs(q[:, k])))
             table = "" if _has_points(file) else "_deg, for any number of turns, or "
-            problem = (
+            fault = (
                 f"joint {joint.name!r} turns to {most:.4g} rad at waypoint {row}; "
                 f"is it in degrees? expected {table}radians"
                 + ("" if limits else ", at most two turns either way without limits")
             )
-            raise InvalidFile(file=file, problem=problem)
+            raise InvalidFile(file=file, fault=fault)

@@ -105,8 +105,8 @@ def _bodies(
         if pieces := links.pieces(link):
             found.append(Body(joints.frames[name], pieces, name))
     if not found:
-        problem = "no link has a collision solid: there is nothing to prove"
-        raise joints.invalid(problem)
+        fault = "no link has a collision solid: there is nothing to prove"
+        raise joints.invalid(fault)
     return tuple(found)
 
 

@@ -47,8 +47,8 @@ def urdf_text(
         return declared(read_text(path, limit=MAX_BYTES)), ()
     check_is_file(path)
     if find_spec("xacrodoc") is None:
-        problem = "xacro needs xacrodoc: pip install 'vdsm-pin[xacro]'"
-        raise InvalidFile(file=path, problem=problem)
+        fault = "xacro needs xacrodoc: pip install 'vdsm-pin[xacro]'"
+        raise InvalidFile(file=path, fault=fault)
     with tempfile.TemporaryDirectory() as folder:
         return _expanded(path, package_dirs, Path(folder) / "robot.urdf")
 
@@ -74,12 +74,12 @@ def _expanded(
             check=False,
         )
     except subprocess.TimeoutExpired:
-        problem = f"is not expanded by xacrodoc within {SLOWEST:g} s"
-        raise InvalidFile(file=path, problem=problem) from None
+        fault = f"is not expanded by xacrodoc within {SLOWEST:g} s"
+        raise InvalidFile(file=path, fault=fault) from None
     if done.returncode or not out.is_file():
         said = done.stderr.strip().splitlines() or ["no output"]
-        problem = f"is not expanded by xacrodoc: {said[-1].strip()}"
-        raise InvalidFile(file=path, problem=problem)
+        fault = f"is not expanded by xacrodoc: {said[-1].strip()}"
+        raise InvalidFile(file=path, fault=fault)
     named = dict.fromkeys(json.loads(done.stdout.splitlines()[-1]))
     included = dict.fromkeys((beside / name).resolve() for name in named)
     # One that is optional need not be there.

@@ -115,7 +115,7 @@ def _check_settings(order: SimulationOrder) -> None:
     except InvalidInput as error:
         if order.settings_file is None:
             raise
-        raise InvalidFile(file=order.settings_file, problem=str(error)) from error
+        raise InvalidFile(file=order.settings_file, fault=str(error)) from error
 
 
 def simulate_to_folder(order: SimulationOrder) -> SimulationFile:

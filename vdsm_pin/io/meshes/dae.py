@@ -35,16 +35,16 @@ def read_dae(stream: MeshStream) -> RawMesh:
         InvalidFile: If it is damaged, or has faces in a form that is not read.
     """
     if stream.size > MAX_BYTES:
-        problem = f"is larger than {MAX_BYTES >> 20} MiB, the most that is read as XML"
-        raise stream.invalid(problem)
+        fault = f"is larger than {MAX_BYTES >> 20} MiB, the most that is read as XML"
+        raise stream.invalid(fault)
     content = stream.content.read()
     plain = content.replace(b"\0", b"")  # of two bytes or four a letter, perhaps
     if b"<!DOCTYPE" in plain:  # whose entities may grow without end
-        raise stream.invalid(problem="has a DOCTYPE, expected plain XML")
+        raise stream.invalid(fault="has a DOCTYPE, expected plain XML")
     root = read_xml(content, stream.path)
     if _tag(root) != "COLLADA":
-        problem = f"is no COLLADA file: its root is {_tag(root)[:40]!r}"
-        raise stream.invalid(problem)
+        fault = f"is no COLLADA file: its root is {_tag(root)[:40]!r}"
+        raise stream.invalid(fault)
     return _Reader(stream, root).read()
 
 
@@ -91,8 +91,8 @@ class _Reader:
             for unit in _children(asset, "unit"):
                 metres = self._floats(unit.get("meter", "1"), 1)[0]
                 if not 1e-9 <= metres <= 1e9:
-                    problem = f"its unit is {metres:g} m, expected 1e-9 to 1e9"
-                    raise self._stream.invalid(problem)
+                    fault = f"its unit is {metres:g} m, expected 1e-9 to 1e9"
+                    raise self._stream.invalid(fault)
                 return float(metres)
         return 1.0
 
@@ -105,15 +105,15 @@ class _Reader:
         self._n_nodes += 1
         if depth > 100 or self._n_nodes > MAX_NODES:
             raise self._stream.invalid(
-                problem=f"has nodes 100 deep or more than {MAX_NODES}"
+                fault=f"has nodes 100 deep or more than {MAX_NODES}"
             )
         for child in node:
             tag = _tag(child)
             if tag in _MOVES:
                 pose = composed(self._stream, pose, self._move(child))
             elif tag in ("skew", "lookat"):
-                problem = f"places a part by <{tag}>, which is not read"
-                raise self._stream.invalid(problem)
+                fault = f"places a part by <{tag}>, which is not read"
+                raise self._stream.invalid(fault)
         for child in node:
             match _tag(child):
                 case "node":
@@ -123,8 +123,8 @@ class _Reader:
                 case "instance_geometry":
                     self._put(self._named(child, "url"), pose)
                 case "instance_controller":
-                    problem = "is bent by a skin; export it as it stands"
-                    raise self._stream.invalid(problem)
+                    fault = "is bent by a skin; export it as it stands"
+                    raise self._stream.invalid(fault)
 
     def _move(self, element: _Element) -> FloatArray:
         kind = _tag(element)
@@ -142,7 +142,7 @@ class _Reader:
         for mesh in geometry:
             if _tag(mesh) in _OTHERS:
                 raise self._stream.invalid(
-                    problem=f"has a <{_tag(mesh)}>, which is not read"
+                    fault=f"has a <{_tag(mesh)}>, which is not read"
                 )
             for faces in mesh:
                 if _tag(faces) in _LINES:
@@ -159,8 +159,8 @@ class _Reader:
             self._ints(p.text or "")[offset::stride] for p in _children(faces, "p")
         ]
         if next(_children(faces, "ph"), None) is not None:
-            problem = "has faces with holes (<ph>), which are not read"
-            raise self._stream.invalid(problem)
+            fault = "has faces with holes (<ph>), which are not read"
+            raise self._stream.invalid(fault)
         match _tag(faces):
             case "polygons":
                 sizes = np.array([len(loop) for loop in loops], dtype=np.int64)
@@ -176,10 +176,10 @@ class _Reader:
         corners = np.concatenate([np.zeros(0, np.int64), *loops])
         good = (corners >= 0) & (corners < len(vertices))
         if not good.all() or len(corners) != sizes.sum() or (sizes < 0).any():
-            problem = (
+            fault = (
                 f"<{_tag(faces)}> names vertices that are not there, or is cut short"
             )
-            raise self._stream.invalid(problem)
+            raise self._stream.invalid(fault)
         corners = corners[np.repeat(sizes >= 3, sizes)]
         self._stream.check_numbers(vertices, "vertex", used=corners)
         cut = cut_faces(vertices, corners, sizes[sizes >= 3])
@@ -197,14 +197,14 @@ class _Reader:
             if one.get("semantic") == "VERTEX":
                 offset, vertices = place, self._vertices(self._named(one, "source"))
         if not 0 <= offset < stride <= 64:
-            raise self._stream.invalid(problem=f"<{_tag(faces)}> names no vertices")
+            raise self._stream.invalid(fault=f"<{_tag(faces)}> names no vertices")
         return offset, stride, vertices
 
     def _vertices(self, element: _Element) -> FloatArray:
         for one in _children(element, "input"):
             if one.get("semantic") == "POSITION":
                 return self._source(self._named(one, "source"))
-        raise self._stream.invalid(problem="has <vertices> without POSITION")
+        raise self._stream.invalid(fault="has <vertices> without POSITION")
 
     def _source(self, source: _Element) -> FloatArray:
         """Points of a source, shape (n, 3)."""
@@ -222,11 +222,11 @@ class _Reader:
                     or min(start, count) < 0
                     or start + count * stride > len(values)
                 ):
-                    problem = "has a source that is not X, Y, Z, or is cut short"
-                    raise self._stream.invalid(problem)
+                    fault = "has a source that is not X, Y, Z, or is cut short"
+                    raise self._stream.invalid(fault)
                 rows = values[start : start + count * stride].reshape(count, stride)
                 return rows[:, :3]
-        raise self._stream.invalid(problem="has a source without accessor")
+        raise self._stream.invalid(fault="has a source without accessor")
 
     def _named(self, element: _Element, key: str) -> _Element:
         """What an element points to in this file."""
@@ -234,7 +234,7 @@ class _Reader:
         found = self._by_id.get(name[1:], []) if name[:1] == "#" != name else []
         if len(found) != 1:
             place = f"there {len(found)} times" if found else "not in this file"
-            raise self._stream.invalid(problem=f"names {name[:60]!r}, which is {place}")
+            raise self._stream.invalid(fault=f"names {name[:60]!r}, which is {place}")
         return found[0]
 
     def _floats(self, text: str, count: int | None = None) -> FloatArray:
@@ -256,8 +256,8 @@ class _Reader:
             values = []
         good = all(-_LARGEST_INT < x < _LARGEST_INT for x in values if kind is int)
         if not good or len(values) != (len(words) if count is None else count):
-            problem = f"found {' '.join(words[:9])[:60]!r} where numbers are meant"
-            raise self._stream.invalid(problem)
+            fault = f"found {' '.join(words[:9])[:60]!r} where numbers are meant"
+            raise self._stream.invalid(fault)
         return values
 
 

@@ -114,21 +114,21 @@ def read_glb(stream: MeshStream) -> RawMesh:
     """
     text, data = _chunks(stream)
     if len(text) > _MOST_JSON:
-        raise stream.invalid(problem=f"has more than {_MOST_JSON >> 20} MiB of JSON")
+        raise stream.invalid(fault=f"has more than {_MOST_JSON >> 20} MiB of JSON")
     try:
         document = _Document.model_validate(json.loads(text))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
-        problem = f"its glTF is damaged: {first['msg']}"
-        raise stream.invalid(problem, where=where) from None
+        fault = f"its glTF is damaged: {first['msg']}"
+        raise stream.invalid(fault, where=where) from None
     except (ValueError, RecursionError) as error:
-        problem = f"its glTF is no JSON: {' '.join(str(error).split())[:80]}"
-        raise stream.invalid(problem) from None
+        fault = f"its glTF is no JSON: {' '.join(str(error).split())[:80]}"
+        raise stream.invalid(fault) from None
     for name in document.extensionsRequired:
         if not name.startswith(_LOOKS) and name not in _KNOWN:
-            problem = f"requires the extension {name[:60]!r}, which is not read"
-            raise stream.invalid(problem)
+            fault = f"requires the extension {name[:60]!r}, which is not read"
+            raise stream.invalid(fault)
     return _Reader(stream, document, data).read()
 
 
@@ -137,19 +137,19 @@ def _chunks(stream: MeshStream) -> tuple[bytes, bytes]:
     content = stream.content.read()
     magic, version, length = content[:4], *_words(content, 4)
     if magic != b"glTF" or version != 2 or length > len(content):
-        raise stream.invalid(problem="is no GLB file of version 2, or cut short")
+        raise stream.invalid(fault="is no GLB file of version 2, or cut short")
     stream.check_end(content[length:], f"{length} bytes")
     offset, found = 12, dict[int, bytes]()
     while offset < length:
         size, kind = _words(content, offset)
         if offset + 8 + size > length:
-            raise stream.invalid(problem=f"a chunk promises {size} bytes, fewer follow")
+            raise stream.invalid(fault=f"a chunk promises {size} bytes, fewer follow")
         if kind in (_JSON, _BIN) and kind in found:
-            raise stream.invalid(problem="has two chunks of a kind, expected one")
+            raise stream.invalid(fault="has two chunks of a kind, expected one")
         found[kind] = content[offset + 8 : offset + 8 + size]
         offset += 8 + size
     if _JSON not in found:
-        raise stream.invalid(problem="has no JSON chunk")
+        raise stream.invalid(fault="has no JSON chunk")
     return found[_JSON], found.get(_BIN, b"")
 
 
@@ -174,8 +174,8 @@ class _Reader:
         while left:
             number, pose = left.pop()
             if number in seen:
-                problem = f"node {number} stands in the scene twice"
-                raise self._stream.invalid(problem)
+                fault = f"node {number} stands in the scene twice"
+                raise self._stream.invalid(fault)
             seen.add(number)
             node = self._at("nodes", number)
             pose = composed(self._stream, pose, node.pose())
@@ -201,20 +201,20 @@ class _Reader:
     def _at(self, kind: str, number: int) -> Any:
         things = getattr(self._document, kind)
         if number >= len(things):
-            problem = f"names {kind}[{number}], there are {len(things)}"
-            raise self._stream.invalid(problem)
+            fault = f"names {kind}[{number}], there are {len(things)}"
+            raise self._stream.invalid(fault)
         return things[number]
 
     def _put(self, node: _Node, number: int, pose: FloatArray) -> None:
         if "EXT_mesh_gpu_instancing" in node.extensions:
-            problem = f"node {number} has many instances, which are not read"
-            raise self._stream.invalid(problem)
+            fault = f"node {number} has many instances, which are not read"
+            raise self._stream.invalid(fault)
         if node.mesh is None:
             return
         mesh = self._at("meshes", node.mesh)
         if node.skin is not None or any(node.weights or mesh.weights):
             bent = f"node {number} is bent by a skin or by morph targets"
-            raise self._stream.invalid(problem=f"{bent}; export it as it stands")
+            raise self._stream.invalid(fault=f"{bent}; export it as it stands")
         if node.mesh not in self._parts:
             made = (self._part(one) for one in mesh.primitives)
             self._parts[node.mesh] = [part for part in made if part is not None]
@@ -225,8 +225,8 @@ class _Reader:
             self._left_out += 1
             return None
         if "KHR_draco_mesh_compression" in primitive.extensions:
-            problem = "is compressed (KHR_draco_mesh_compression), which is not read"
-            raise self._stream.invalid(problem)
+            fault = "is compressed (KHR_draco_mesh_compression), which is not read"
+            raise self._stream.invalid(fault)
         if "POSITION" not in primitive.attributes:
             return None
         vertices = self._numbers(primitive.attributes["POSITION"], "VEC3")
@@ -234,12 +234,12 @@ class _Reader:
         if primitive.indices is not None:
             accessor = self._at("accessors", primitive.indices)
             if accessor.componentType not in _INDICES:
-                problem = "has indices that are no whole numbers"
-                raise self._stream.invalid(problem)
+                fault = "has indices that are no whole numbers"
+                raise self._stream.invalid(fault)
             order = self._numbers(primitive.indices, "SCALAR")[:, 0].astype(np.int64)
         if not (order < len(vertices)).all():
-            problem = f"names vertex {order.max()} of {len(vertices)}"
-            raise self._stream.invalid(problem)
+            fault = f"names vertex {order.max()} of {len(vertices)}"
+            raise self._stream.invalid(fault)
         return Part(vertices, _triangles(order, primitive.mode))
 
     def _numbers(self, number: int, shape: str) -> FloatArray:
@@ -247,14 +247,14 @@ class _Reader:
         accessor: _Accessor = self._at("accessors", number)
         width = {"SCALAR": 1, "VEC3": 3}[shape]
         if accessor.type != shape or accessor.sparse is not None:
-            problem = f"accessors[{number}] is sparse or no {shape}, which is not read"
-            raise self._stream.invalid(problem)
+            fault = f"accessors[{number}] is sparse or no {shape}, which is not read"
+            raise self._stream.invalid(fault)
         if accessor.bufferView is None:
-            raise self._stream.invalid(problem=f"accessors[{number}] has no data")
+            raise self._stream.invalid(fault=f"accessors[{number}] has no data")
         view: _View = self._at("bufferViews", accessor.bufferView)
         if view.buffer != 0 or self._at("buffers", 0).uri or view.extensions:
-            problem = "has data in another file or compressed, which is not read"
-            raise self._stream.invalid(problem)
+            fault = "has data in another file or compressed, which is not read"
+            raise self._stream.invalid(fault)
         if not accessor.count:
             return np.zeros((0, width))
         kind = _NUMBERS[accessor.componentType]
@@ -263,8 +263,8 @@ class _Reader:
         end = accessor.byteOffset + stride * (accessor.count - 1) + size
         whole = view.byteOffset + view.byteLength <= len(self._data)
         if not (whole and end <= view.byteLength and stride >= size):
-            problem = f"accessors[{number}] promises {accessor.count} values, too many"
-            raise self._stream.invalid(problem)
+            fault = f"accessors[{number}] promises {accessor.count} values, too many"
+            raise self._stream.invalid(fault)
         shaped = np.ndarray(
             (accessor.count, width), kind, self._data, start, (stride, kind.itemsize)
         )

@@ -46,11 +46,11 @@ def read_obj(stream: MeshStream) -> RawMesh:
             case "l" | "p":
                 faces.lines += 1
             case word if word in _FREE_FORM:
-                problem = f"has a free-form curve or surface ({word}), expected faces"
-                raise stream.invalid(problem, line=number)
+                fault = f"has a free-form curve or surface ({word}), expected faces"
+                raise stream.invalid(fault, line=number)
             case word if word in _ELSEWHERE:
-                problem = f"takes in another file ({word}), expected all in one"
-                raise stream.invalid(problem, line=number)
+                fault = f"takes in another file ({word}), expected all in one"
+                raise stream.invalid(fault, line=number)
     return _mesh(faces, stream)
 
 
@@ -78,8 +78,8 @@ def _whole_lines(stream: MeshStream) -> Iterator[tuple[int, str]]:
         first, length = first or number, length + len(plain)
         begun.append(plain[:-1] if goes_on else plain)
         if length > MAX_MESH_LINE:
-            problem = f"goes on for more than {MAX_MESH_LINE} characters"
-            raise stream.invalid(problem, line=first)
+            fault = f"goes on for more than {MAX_MESH_LINE} characters"
+            raise stream.invalid(fault, line=first)
         if not goes_on:
             yield first, " ".join(begun)
             first, begun, length = 0, [], 0
@@ -91,8 +91,8 @@ def _read_face(words: list[str], faces: _Faces, stream: MeshStream, line: int) -
     """Corners such as 7, 7/1 or -2//3, counted from 0."""
     count = len(faces.vertices) // 3
     if len(words) < 3:
-        problem = f"a face has {len(words)} corners, expected 3 or more"
-        raise stream.invalid(problem, line=line)
+        fault = f"a face has {len(words)} corners, expected 3 or more"
+        raise stream.invalid(fault, line=line)
     for word in words:
         digits = word.partition("/")[0]
         try:
@@ -102,8 +102,8 @@ def _read_face(words: list[str], faces: _Faces, stream: MeshStream, line: int) -
         index = index - 1 if index > 0 else count + index
         if not 0 <= index < count or "_" in digits:
             named = f"the face corner {word[:40]!r}"
-            problem = f"{named} names none of the {count} vertices above"
-            raise stream.invalid(problem, line=line)
+            fault = f"{named} names none of the {count} vertices above"
+            raise stream.invalid(fault, line=line)
         faces.corners.append(index)
     faces.sizes.append(len(words))
     stream.check_room(0, len(faces.corners))

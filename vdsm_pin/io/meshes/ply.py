@@ -72,12 +72,12 @@ def read_ply(stream: MeshStream) -> RawMesh:
     """
     header = _header(stream)
     if "tristrips" in header.elements:
-        raise stream.invalid(problem="has triangle strips, expected faces")
+        raise stream.invalid(fault="has triangle strips, expected faces")
     read = _elements(stream, header)
     face = read.get("face", {})
     corners = face.get("vertex_indices") or face.get("vertex_index")
     if corners is None:
-        raise stream.invalid(problem="has no vertex_indices of its faces")
+        raise stream.invalid(fault="has no vertex_indices of its faces")
     return _mesh(stream, _vertices(stream, read), corners)
 
 
@@ -103,9 +103,9 @@ def _vertices(stream: MeshStream, read: dict[str, _Columns]) -> FloatArray:
     axes = [read.get("vertex", {}).get(axis) for axis in "xyz"]
     columns = [axis.values for axis in axes if axis is not None]
     if len(columns) != 3:
-        raise stream.invalid(problem="has no x, y, z of its vertices")
+        raise stream.invalid(fault="has no x, y, z of its vertices")
     if len({len(column) for column in columns}) != 1:
-        raise stream.invalid(problem="has lists where x, y and z are meant")
+        raise stream.invalid(fault="has lists where x, y and z are meant")
     return np.column_stack(columns)
 
 
@@ -116,8 +116,8 @@ def _mesh(stream: MeshStream, vertices: FloatArray, faces: _Column) -> RawMesh:
     good = (corners >= 0) & (corners < len(vertices)) & (corners % 1 == 0)
     if not good.all():
         wrong = corners[np.argmin(good)]
-        problem = f"a face names vertex {wrong:g}, expected 0 to {len(vertices) - 1}"
-        raise stream.invalid(problem)
+        fault = f"a face names vertex {wrong:g}, expected 0 to {len(vertices) - 1}"
+        raise stream.invalid(fault)
     numbers = corners.astype(np.int64)
     stream.check_numbers(vertices, "vertex", used=numbers)
     cut = cut_faces(vertices, numbers, sizes)
@@ -141,11 +141,11 @@ def _header(stream: MeshStream) -> _Header:
             case ["format", name, _] if name in _FORMATS:
                 order = _FORMATS[name]
             case ["element", name, _] if name in elements:
-                problem = f"has the element {name[:60]!r} twice"
-                raise stream.invalid(problem, line=number)
+                fault = f"has the element {name[:60]!r} twice"
+                raise stream.invalid(fault, line=number)
             case ["property", *_, name] if name in (one.name for one in latest or ()):
-                problem = f"has the property {name[:60]!r} twice"
-                raise stream.invalid(problem, line=number)
+                fault = f"has the property {name[:60]!r} twice"
+                raise stream.invalid(fault, line=number)
             case ["element", name, count] if count.isdecimal() and len(count) < 12:
                 stream.check_room(int(count))
                 elements[name] = _Element(name, int(count))
@@ -161,9 +161,9 @@ def _header(stream: MeshStream) -> _Header:
             case ["end_header"] if order is not None:
                 return _Header(order, elements, number)
             case _:
-                problem = f"is no header of a PLY file: {raw.strip()[:60]!r}"
-                raise stream.invalid(problem, line=number)
-    raise stream.invalid(problem=f"has a header of more than {_MOST_LINES} lines")
+                fault = f"is no header of a PLY file: {raw.strip()[:60]!r}"
+                raise stream.invalid(fault, line=number)
+    raise stream.invalid(fault=f"has a header of more than {_MOST_LINES} lines")
 
 
 def _text(stream: MeshStream, header: _Header) -> dict[str, _Columns]:
@@ -177,7 +177,7 @@ def _text(stream: MeshStream, header: _Header) -> dict[str, _Columns]:
             number, words = next(lines, (0, []))
             if not words:
                 promised = f"promises {element.count} of {element.name!r}, has {i}"
-                raise stream.invalid(problem=f"is cut short: its header {promised}")
+                raise stream.invalid(fault=f"is cut short: its header {promised}")
             for k, one in enumerate(_split(stream, element, words, number)):
                 values[k].extend(stream.numbers(one, len(one), number))
                 sizes[k].append(len(one))
@@ -203,13 +203,13 @@ def _split(
             size = int(number) if whole else -1
         part = words[place : place + size]
         if size < 0 or len(part) != size:
-            problem = f"has {len(words)} values, too few for {element.name!r}"
-            raise stream.invalid(problem, line=line)
+            fault = f"has {len(words)} values, too few for {element.name!r}"
+            raise stream.invalid(fault, line=line)
         yield part
         place += size
     if place != len(words):
-        problem = f"has {len(words)} values, {element.name!r} has {place}"
-        raise stream.invalid(problem, line=line)
+        fault = f"has {len(words)} values, {element.name!r} has {place}"
+        raise stream.invalid(fault, line=line)
 
 
 class _Binary:
@@ -286,8 +286,8 @@ class _Binary:
         return int.from_bytes(part, self._order, signed=one.count_kind[0] == "i")
 
     def _cut_short(self, element: _Element) -> Exception:
-        problem = (
+        fault = (
             f"is cut short: its header promises {element.count} of {element.name!r}, "
             "fewer bytes follow"
         )
-        return self._stream.invalid(problem)
+        return self._stream.invalid(fault)

@@ -40,8 +40,8 @@ def check_ending(path: Path, known: Iterable[str]) -> str:
     """
     kind, (*most, last) = path.suffix.lower(), known
     if kind not in (*most, last):
-        problem = f"has the ending {kind!r}, expected {', '.join(most)} or {last}"
-        raise InvalidFile(file=path, problem=problem)
+        fault = f"has the ending {kind!r}, expected {', '.join(most)} or {last}"
+        raise InvalidFile(file=path, fault=fault)
     return kind
 
 
@@ -79,10 +79,10 @@ class MeshStream:
     size: int
     content: "io.BufferedReader[Any]"
 
-    def invalid(self, problem: str, *, line: int = 0, where: str = "") -> InvalidFile:
+    def invalid(self, fault: str, *, line: int = 0, where: str = "") -> InvalidFile:
         """The error that names the file, and the line where there is one."""
         where = f"line {line}" if line else where
-        return InvalidFile(file=self.path, where=where, problem=problem)
+        return InvalidFile(file=self.path, where=where, fault=fault)
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Numbered lines, whatever their ends; bytes beyond ASCII as Latin-1.
@@ -97,12 +97,12 @@ class MeshStream:
         try:
             line = text.readline(MAX_MESH_LINE)
             if line.startswith(_UTF_16):
-                raise self.invalid(problem="is UTF-16 text, expected UTF-8 or ASCII")
+                raise self.invalid(fault="is UTF-16 text, expected UTF-8 or ASCII")
             number, line = 1, line.removeprefix(_BOM)
             while line:
                 if len(line) == MAX_MESH_LINE and line[-1] != "\n":
-                    problem = f"is longer than {MAX_MESH_LINE} characters"
-                    raise self.invalid(problem, line=number)
+                    fault = f"is longer than {MAX_MESH_LINE} characters"
+                    raise self.invalid(fault, line=number)
                 yield number, line
                 number, line = number + 1, text.readline(MAX_MESH_LINE)
         finally:
@@ -120,8 +120,8 @@ class MeshStream:
         except ValueError:
             values = []
         if len(values) != count or "_" in "".join(words):  # which Python passes over
-            problem = f"found {' '.join(words)[:80]!r}, expected {count} numbers"
-            raise self.invalid(problem, line=line)
+            fault = f"found {' '.join(words)[:80]!r}, expected {count} numbers"
+            raise self.invalid(fault, line=line)
         return values
 
     def check_end(self, left: bytes | object, announced: str) -> None:
@@ -138,8 +138,8 @@ class MeshStream:
         if isinstance(left, bytes) and len(left) <= PADDING:
             left = left.strip(b"\0 \t\r\n")
         if left:
-            problem = f"has more data than its header announces: {announced}"
-            raise self.invalid(problem)
+            fault = f"has more data than its header announces: {announced}"
+            raise self.invalid(fault)
 
     def check_count(self, triangles: int) -> None:
         """Refuse more triangles than any mesh may have, before room is made for them.
@@ -148,8 +148,8 @@ class MeshStream:
             InvalidFile: If there are more.
         """
         if triangles > MAX_TRIANGLES:
-            problem = f"has {triangles} triangles, the most is {MAX_TRIANGLES}"
-            raise self.invalid(problem)
+            fault = f"has {triangles} triangles, the most is {MAX_TRIANGLES}"
+            raise self.invalid(fault)
 
     def check_room(self, vertices: int, corners: int = 0) -> None:
         """Refuse more than there may be, while it is read.
@@ -158,8 +158,8 @@ class MeshStream:
             InvalidFile: If there are more vertices or corners.
         """
         if max(vertices, corners) > MAX_CORNERS:
-            problem = f"has more than {MAX_CORNERS} vertices or corners of faces"
-            raise self.invalid(problem)
+            fault = f"has more than {MAX_CORNERS} vertices or corners of faces"
+            raise self.invalid(fault)
 
     def check_numbers(
         self, rows: FloatArray, noun: str, *, used: IntArray | None = None
@@ -180,6 +180,6 @@ class MeshStream:
             matters[used] = True
             bad &= matters
         if bad.any():
-            problem = f"has a coordinate that is not a number up to {LARGEST:g}"
+            fault = f"has a coordinate that is not a number up to {LARGEST:g}"
             where = f"{noun} {int(np.argmax(bad)) + 1}"
-            raise self.invalid(problem, where=where)
+            raise self.invalid(fault, where=where)

@@ -32,8 +32,8 @@ def composed(stream: MeshStream, pose: FloatArray, move: FloatArray) -> FloatArr
     good = np.abs(move) <= LARGEST
     result = pose @ move if good.all() else np.full((4, 4), np.inf)
     if not (np.abs(result) <= LARGEST).all() or (result[3] != [0, 0, 0, 1]).any():
-        problem = "places a part by a matrix that is not affine or not finite"
-        raise stream.invalid(problem)
+        fault = "places a part by a matrix that is not affine or not finite"
+        raise stream.invalid(fault)
     return np.asarray(result)
 
 

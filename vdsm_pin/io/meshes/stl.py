@@ -29,17 +29,17 @@ def read_stl(stream: MeshStream) -> RawMesh:
     """
     head = stream.content.peek(_START)[:_START]
     if head[2:12].replace(b"\0", b"").lower() == b"solid":
-        raise stream.invalid(problem="is UTF-16 text, expected UTF-8 or ASCII")
+        raise stream.invalid(fault="is UTF-16 text, expected UTF-8 or ASCII")
     count = int.from_bytes(head[_HEADER:], "little")
     is_whole = len(head) == _START
     if is_whole and (head[-1] == 0 or count in _UNKNOWN):
         return _binary(stream, count)
     if head.lstrip(b"\xef\xbb\xbf \t\r\n")[:5].lower() == b"solid":
         return _text(stream)
-    problem = "is neither text nor binary STL"
+    fault = "is neither text nor binary STL"
     if not is_whole:
-        problem += f": only {stream.size} bytes"
-    raise stream.invalid(problem)
+        fault += f": only {stream.size} bytes"
+    raise stream.invalid(fault)
 
 
 def _binary(stream: MeshStream, promised: int) -> RawMesh:
@@ -63,11 +63,11 @@ def _count(stream: MeshStream, promised: int) -> tuple[int, tuple[str, ...]]:
         return there, notes
     if promised in _UNKNOWN and not rest:
         return there, (f"its header counts {promised} triangles, {there} are there",)
-    problem = (
+    fault = (
         f"is damaged: its header promises {promised} triangles, "
         f"{promised * _RECORD.itemsize} bytes, but {size} bytes follow"
     )
-    raise stream.invalid(problem)
+    raise stream.invalid(fault)
 
 
 def _text(stream: MeshStream) -> RawMesh:
@@ -85,10 +85,10 @@ def _text(stream: MeshStream) -> RawMesh:
             stream.check_room(len(numbers) // 3)
         elif last == "endloop" and len(numbers) - in_loop != 9:
             found = (len(numbers) - in_loop) // 3
-            problem = f"the facet has {found} corners, expected 3"
-            raise stream.invalid(problem, line=number)
+            fault = f"the facet has {found} corners, expected 3"
+            raise stream.invalid(fault, line=number)
     if last != "endsolid" or len(numbers) % 9:
-        raise stream.invalid(problem="is truncated: it does not end in endsolid")
+        raise stream.invalid(fault="is truncated: it does not end in endsolid")
     stream.check_count(len(numbers) // 9)
     corners = np.array(numbers, dtype=np.float64).reshape(-1, 3, 3)
     return _mesh(stream, corners, ())
