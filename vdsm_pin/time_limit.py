@@ -63,6 +63,10 @@ class Deadline:
         """The same limit, which ends so much before."""
         return replace(self, end=self.end - seconds)
 
+    def share(self, part: float) -> "Deadline":
+        """The same limit, for a part of the time that is left; [-]."""
+        return self if self.end == inf else self.earlier((1.0 - part) * self.left)
+
     def check(self, reached: str = "") -> None:
         """Go on, unless the time is over; the error says how far the work came.
 

@@ -1,17 +1,21 @@
 """The largest reserve for which there is still a plan, by bisection."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import Infeasible
+from vdsm_pin.errors import Infeasible, OutOfTime
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import in_mm
+from vdsm_pin.units import at_most_mm
 
 ROUNDS: Final = 6
 """Halvings of the reserve; the last tells it to 1/64 of where it was sought."""
+
+IMPROVE_SHARE: Final = 0.5
+"""Part of the time left for making a plan better; the rest is for its proof; [-]."""
 
 
 def drawn_length(plan: Plan) -> float:
@@ -21,9 +25,26 @@ def drawn_length(plan: Plan) -> float:
     return float(step[on[:-1] & on[1:]].sum())
 
 
-def told(kept: float) -> str:
-    """What was found out, by the clearance that the last plan was to keep; [m]."""
-    return f"of the plans that were to keep more than {in_mm(kept)} none draws as much"
+@dataclass(frozen=True)
+class Widest:
+    """Plans with more and more in reserve.
+
+    Args:
+        plans: In the order of their reserves.
+        beyond: The least reserve that none was found to have, or none has.
+        in_time: Whether the search came to its end before the time was over.
+    """
+
+    plans: list[Plan]
+    beyond: float
+    in_time: bool
+
+    def told(self, kept: float) -> str:
+        """What was found out, by the clearance kept without a reserve; [m]."""
+        most = at_most_mm(kept + self.beyond)
+        if self.in_time:
+            return f"of the plans that were to keep {most} none draws as much"
+        return f"the time was over before plans that keep up to {most} were all tried"
 
 
 def widest(
@@ -33,11 +54,12 @@ def widest(
     high: float,
     rounds: int = ROUNDS,
     until: float = 0.0,
-) -> tuple[list[Plan], float]:
+) -> Widest:
     """Plans with more and more in reserve that draw as much as the first one.
 
     Args:
-        plan_with: A plan that keeps a reserve; raises `Infeasible` where it has none.
+        plan_with: A plan that keeps a reserve; raises `Infeasible` where it has none,
+            `OutOfTime` where the search has to end.
         first: What there is without any search.
         low: A reserve it has.
         high: A reserve that nothing has.
@@ -45,7 +67,7 @@ def widest(
         until: Width of what is left at which to stop, in the unit of the reserves.
 
     Returns:
-        The plans, the first one included, and the reserve of the last.
+        The plans, the first one included.
     """
     plans, whole = [first], drawn_length(first) - TOLERANCES.joint_centre
     for _ in range(rounds):
@@ -57,9 +79,11 @@ def widest(
         except Infeasible:
             high = middle
             continue
+        except OutOfTime:
+            return Widest(plans, high, in_time=False)
         if drawn_length(plan) < whole:
             high = middle
         else:
             plans.append(plan)
             low = middle
-    return plans, low
+    return Widest(plans, high, in_time=True)

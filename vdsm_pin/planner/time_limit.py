@@ -31,6 +31,11 @@ def deadline_of(clearance: LinkClearance) -> Deadline:
     return deadline
 
 
+def with_share(clearance: LinkClearance, share: float) -> LinkClearance:
+    """The same clearance function, for a part of the time that is left; [-]."""
+    return within_time(clearance, deadline_of(clearance).share(share))
+
+
 @dataclass(frozen=True)
 class _Timed:
     """A clearance function and its deadline."""

@@ -176,6 +176,10 @@ class BroadPhase:
         """The same, exact only below another bound; [m]."""
         return replace(self, far=far)
 
+    def hurried(self, share: float) -> "BroadPhase":
+        """The same, for a part of the time that is left; [-]."""
+        return replace(self, deadline=self.deadline.share(share))
+
 
 def broad_phase(problem: PlanningProblem, clearance: LinkClearance) -> BroadPhase:
     """The clearance function of a problem with its boxes."""

@@ -1,6 +1,7 @@
 """What the user is told: why there is no plan, and what is proved about a plan."""
 
 import itertools
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from vdsm_pin.errors import (
     Infeasible,
     NoPlanFound,
     OutOfReach,
+    OutOfTime,
     PathBlocked,
     Reached,
 )
@@ -261,7 +263,8 @@ def notes_of(
     tips = centres[on_path, -1]
     # No more than two are ever proved necessary.
     few, least = changed <= 2, np.zeros_like(changed)
-    least[few] = least_changed(held_from(problem), clearance, tips[few])
+    with suppress(OutOfTime):  # then nothing is said of it
+        least[few] = least_changed(held_from(problem), clearance, tips[few])
     if (changed < least).any():
         worst = int(np.flatnonzero(changed < least)[0])
         message = (

@@ -5,9 +5,10 @@ Everything is counted, nothing is timed: the same problem gives the same plan.
 
 import itertools
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -40,6 +41,7 @@ from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips
 from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.impossible.last_link import hemmed_in
 from vdsm_pin.planner.upper_clearance import TIP_ONLY, held_from, last_link
+from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -63,6 +65,10 @@ ONE_KNEE_DRAWS: Final = 0.75
 may draw the path with fewer knees than an insertion; [-]."""
 FEW_KNEES: Final = 2.0
 """Mean number of knees of an insertion up to which no roadmap is asked for fewer."""
+
+PROOF_SHARE: Final = 0.1
+"""Part of the time left for a proof before it is put off until the searches end; [-].
+"""
 
 LOG: Final = logging.getLogger(__name__)
 
@@ -162,7 +168,8 @@ def explore(
     no_way_out: NoWayOut | None = None
     stuck: Stuck | None = None
     spaces = _Spaces(problem, clearance, margin)
-    proofs = 2 if effort.proves else 0
+    proofs: list[Proving] = [_cut_off, _hemmed_in] if effort.proves else []
+    later: list[Proving] = []
     levels, room = effort.levels, Room(0.0, 0.0)
     while levels:
         if best.found is None and room.confined:
@@ -179,7 +186,7 @@ def explore(
         except NoWayOut as error:
             no_way_out = error
         except OutOfTime:
-            if best.missing > 0.0:
+            if not _will_do(best):
                 raise
             return
         LOG.debug("%s: %.4f m missing", level, now.missing)
@@ -188,7 +195,8 @@ def explore(
         best = replace(best, stuck=stuck)
         inserted = isinstance(level, Insert) and not best.missing > 0.0
         if inserted and BESIDE in levels and room.one_knee_draws:
-            best = best.sparser()
+            with suppress(OutOfTime):
+                best = best.sparser()
             if best.knees > FEW_KNEES:
                 # It draws the path whole; a roadmap may with fewer knees.
                 levels = (BESIDE,)
@@ -199,18 +207,26 @@ def explore(
             return
         if proofs and (level is first or isinstance(level, Insert)):
             # Seldom needed, so only now: can it be done at all?
-            if proofs == 2:
-                space = spaces.of_first((level, *levels))
-                best = _cut_off(problem, clearance, best, space)
-            else:
-                best = _hemmed_in(problem, clearance, best)
-            proofs -= 1
+            prove, space = proofs.pop(0), spaces.of_first((level, *levels))
+            try:
+                best = prove(clearance.hurried(PROOF_SHARE), best, space)
+            except OutOfTime:
+                later.append(prove)
             yield best
             proof = best.proof.take(best.rows.as_stated)
             if proof.undrawable.all():
                 return
+    for prove in later:
+        best = prove(clearance, best, None)
+        yield best
     if best.found is None and stuck is None and no_way_out is not None:
         raise no_way_out
+
+
+def _will_do(outcome: Explored) -> bool:
+    """Whether what has been found is a plan, though more might be found."""
+    whole = outcome.judge.problem.path.blocked is Blocked.FAIL
+    return outcome.found is not None and not (whole and outcome.missing > 0.0)
 
 
 class Room(NamedTuple):
@@ -364,11 +380,15 @@ def _once_inserted(
     return replace(before, found=now.found, stuck=now.stuck or before.stuck)
 
 
+Proving: TypeAlias = Callable[[BroadPhase, Explored, TipSpace | None], Explored]
+"""Proves that rows cannot be drawn, in the time of a clearance function.
+
+The ways of the tip that are known may show that there is nothing to prove.
+"""
+
+
 def _cut_off(
-    problem: PlanningProblem,
-    clearance: BroadPhase,
-    outcome: Explored,
-    space: TipSpace | None,
+    clearance: BroadPhase, outcome: Explored, space: TipSpace | None
 ) -> Explored:
     """The outcome with rows that no way of the tip is proved to lead to.
 
@@ -376,15 +396,16 @@ def _cut_off(
     """
     if space and _leads_there(space, outcome):
         return outcome
-    there, tips = held_from(problem, TIP_ONLY), outcome.rows.tips
+    there, tips = held_from(outcome.judge.problem, TIP_ONLY), outcome.rows.tips
     found = cut_off(there, tips, clearance.deadline)
     return replace(outcome, proof=replace(outcome.proof, cut_off=found))
 
 
 def _hemmed_in(
-    problem: PlanningProblem, clearance: BroadPhase, outcome: Explored
+    clearance: BroadPhase, outcome: Explored, _: TipSpace | None
 ) -> Explored:
     """The outcome with rows not drawn where the last link is proved to have no room."""
+    problem = outcome.judge.problem
     tips, proof = outcome.rows.tips, outcome.proof
     open_ = np.flatnonzero(~(outcome.drawn | proof.undrawable))
     hemmed = np.zeros(len(tips), dtype=np.bool_)

@@ -160,13 +160,17 @@ def pointed(effort: Effort) -> Effort:
 
     Directions say where it looks. Roadmaps are tried first; shapes are not grown.
     """
-    roadmaps = [replace(one, grow=0) for one in THOROUGH[:2] if isinstance(one, Search)]
-    inserts = [one for one in THOROUGH if isinstance(one, Insert) and one.directed]
-    return replace(effort, levels=(*roadmaps, *inserts))
+    roadmaps = [one for one in effort.levels[:2] if isinstance(one, Search)]
+    return replace(
+        effort, levels=(*(replace(one, grow=0) for one in roadmaps), *_directed(effort))
+    )
 
 
-LEANING: Final = Effort(
-    tuple(one for one in THOROUGH if isinstance(one, Insert) and one.directed),
-    proves=True,
-)
-"""For starts that only directions describe."""
+def leaning(effort: Effort) -> Effort:
+    """An effort for starts that only directions describe."""
+    return replace(effort, levels=_directed(effort) or FIRST[1:])
+
+
+def _directed(effort: Effort) -> tuple[Insert, ...]:
+    inserts = [one for one in effort.levels if isinstance(one, Insert)]
+    return tuple(one for one in inserts if one.directed)

@@ -1,6 +1,7 @@
 """The strategies `fewest`, `clearest`, `sturdiest`: search, smooth, write, explain."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -21,7 +22,7 @@ from vdsm_pin.planner.fewest.explain import (
 from vdsm_pin.planner.fewest.explore import Explored, explore
 from vdsm_pin.planner.fewest.joint_error import levers
 from vdsm_pin.planner.fewest.judge import check_cone
-from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort, pointed
+from vdsm_pin.planner.fewest.levels import FULL, QUICK, Effort, leaning, pointed
 from vdsm_pin.planner.fewest.motion import Corners, Rows, dense_rows
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.search import Searched
@@ -33,9 +34,10 @@ from vdsm_pin.planner.fewest.unbend import (
     unbend,
     with_unbending,
 )
-from vdsm_pin.planner.largest_margin import drawn_length, told, widest
+from vdsm_pin.planner.largest_margin import IMPROVE_SHARE, Widest, drawn_length, widest
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.start import check_start
+from vdsm_pin.planner.time_limit import with_share
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -49,6 +51,8 @@ EXPLAIN_SHARE: Final = 0.1
 """Part of the time that is left to tell what stopped a search; [-]."""
 EXPLAIN_MOST: Final = 4.0
 """The longest time left for that; [s]."""
+FINE: Final = 0.004
+"""Plans are made better until this part of what is best at most is left; [-]."""
 FEWEST: Final = CostWeights()
 CLEAREST: Final = CostWeights(angle=0.2, clearance=0.064, clearance_cost=8.0)
 
@@ -81,12 +85,11 @@ def plan_clearest(
     Arguments and errors are those of `plan_fewest`.
     """
     search = _Search(problem, clearance, _largest(margin), "clearest", CLEAREST)
-    plans, reserve = search.clearer(search.plan())
-    plan = plans[-1]
+    found = search.clearer(search.plan())
+    plan = found.plans[-1]
     if not problem.scene.obstacles:
         return plan
-    note = told(search.clearance_kept + reserve)
-    return replace(plan, notes=(*plan.notes, note))
+    return replace(plan, notes=(*plan.notes, found.told(search.clearance_kept)))
 
 
 def plan_sturdiest(
@@ -100,11 +103,12 @@ def plan_sturdiest(
     """
     lean = _Search(problem, clearance, _largest(margin), "sturdiest", FEWEST)
     wide = replace(lean, weights=CLEAREST)
-    found = _if_found(wide.plan)
-    if not found:
+    try:
+        first = wide.plan()
+    except Infeasible:
         return lean.plan()
-    clearer, _ = wide.clearer(found[0])
-    plans = [*_if_found(lean.plan), *clearer, *wide.sturdier(found[0])[1:]]
+    clearer, sturdier = wide.clearer(first), wide.sturdier(first)
+    plans = [*_if_found(lean.hurried.plan), *clearer.plans, *sturdier.plans[1:]]
     whole = max(map(drawn_length, plans)) - TOLERANCES.joint_centre
     plans = _different([plan for plan in plans if drawn_length(plan) >= whole])
     best = max(plans, key=lambda plan: wide.survived(plan.centres))
@@ -122,10 +126,10 @@ def _different(plans: list[Plan]) -> list[Plan]:
 
 
 def _if_found(plan: Callable[[], Plan]) -> list[Plan]:
-    """The plan, nothing where there is none."""
+    """The plan, nothing where there is none, or none in time."""
     try:
         return [plan()]
-    except Infeasible:
+    except (Infeasible, OutOfTime):
         return []
 
 
@@ -144,6 +148,11 @@ class _Search:
         """Clearance that every plan keeps; [m]."""
         return self.problem.required_clearance + self.margin
 
+    @property
+    def hurried(self) -> "_Search":
+        """The same, with a part of the time that is left."""
+        return replace(self, clearance=with_share(self.clearance, IMPROVE_SHARE))
+
     def plan(self, effort: Effort = FULL) -> Plan:
         """What is found with an effort.
 
@@ -160,8 +169,8 @@ class _Search:
                 return with_unbending(problem, rows, there.plan(effort))
             except NoPlanFound:
                 # It does not unbend, or there is no plan from there: by directions.
-                effort = LEANING
-        if problem.path.pointing is not None and effort is not LEANING:
+                return self._explored(leaning(effort))
+        if problem.path.pointing is not None:
             effort = pointed(effort)
         return self._explored(effort)
 
@@ -192,22 +201,14 @@ class _Search:
     def _written(self, clearance: BroadPhase, outcome: Explored) -> Plan:
         """What was found, smoothed and row by row."""
         assert outcome.found is not None
-        problem, weights, judge = self.problem, self.weights, outcome.judge
-        arm, corners = problem.manipulator, outcome.found.corners
-        grown = not isinstance(outcome.found, Searched)
-        if grown:
-            corners = sparser(judge, corners)
-        corners = shortcut(judge, corners, weights)
-        # What is straighter has more knees to spare. A roadmap has few but for an aim.
-        if weights == FEWEST and (grown or problem.path.pointing is not None):
-            corners = sparser(judge, corners)
-        corners = lifted(judge, straightened(judge, corners))
+        problem, judge = self.problem, outcome.judge
+        arm, corners = problem.manipulator, self._smoothed(outcome)
         turn = problem.planned_row_change
         rows = dense_rows(arm, corners, problem.path.spacing, turn, judge.slack)
         alpha, theta = joint_angles(arm, rows.centres)
         # Proofs of what is needed ask no more than whether there is the clearance
         # required.
-        enough = clearance.up_to(problem.required_clearance)
+        enough = clearance.up_to(problem.required_clearance).hurried(IMPROVE_SHARE)
         stations, on_path = _stations(corners, rows)
         trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
         return Plan(
@@ -219,6 +220,21 @@ class _Search:
             notes_of(problem, enough, outcome, trajectory, rows.centres),
         )
 
+    def _smoothed(self, outcome: Explored) -> Corners:
+        """What was found, shorter and with fewer knees, as far as there is time."""
+        assert outcome.found is not None
+        judge, corners = outcome.judge, outcome.found.corners
+        grown = not isinstance(outcome.found, Searched)
+        # What is straighter has more knees to spare. A roadmap has few but for an aim.
+        pointing = self.problem.path.pointing is not None
+        again = self.weights == FEWEST and (grown or pointing)
+        with suppress(OutOfTime):
+            corners = sparser(judge, corners) if grown else corners
+            corners = shortcut(judge, corners, self.weights)
+            corners = sparser(judge, corners) if again else corners
+            corners = lifted(judge, straightened(judge, corners))
+        return corners
+
     def with_reserve(self, reserve: float) -> Plan:
         """One that keeps so much more clearance; [m]."""
         return replace(self, margin=self.margin + reserve).plan(QUICK)
@@ -228,23 +244,21 @@ class _Search:
         weights = replace(self.weights, joint_error=error)
         return replace(self, weights=weights).plan(QUICK)
 
-    def clearer(self, first: Plan) -> tuple[list[Plan], float]:
-        """Plans with more and more clearance, and what the last has in reserve; [m]."""
+    def clearer(self, first: Plan) -> Widest:
+        """Plans with more and more clearance; [m]."""
         low = float(self.clearance(first.centres).min()) - self.clearance_kept
         start = float(self.clearance(first.centres[:1]).min())
         high = min(self._clearance_at_tips(first), start) - self.clearance_kept
-        return widest(self.with_reserve, first, low, high)
+        return widest(self.hurried.with_reserve, first, low, high, until=FINE * high)
 
-    def sturdier(self, first: Plan) -> list[Plan]:
-        """Plans whose links keep what larger and larger joint errors use up."""
+    def sturdier(self, first: Plan) -> Widest:
+        """Plans whose links keep what larger and larger joint errors use up; [rad]."""
         reach = float(levers(self.problem.manipulator)[-1])
-        high = min(
-            (self._clearance_at_tips(first) - self.clearance_kept) / reach,
-            self.survived(first.centres[:1]),
-        )
-        return widest(self.with_joint_error, first, self.survived(first.centres), high)[
-            0
-        ]
+        low, high = self.survived(first.centres), self.survived(first.centres[:1])
+        most = self._clearance_at_tips(first) - self.clearance_kept
+        high = min(most / reach, high)
+        better = self.hurried.with_joint_error
+        return widest(better, first, low, high, until=FINE * high)
 
     def survived(self, centres: FloatArray) -> float:
         """Error of all joints that configurations have room for, roughly; [rad]."""
@@ -265,9 +279,9 @@ def _early(deadline: Deadline) -> Deadline:
 
 def _soon(problem: PlanningProblem, deadline: Deadline) -> Deadline:
     """From when on a part of the path will do, so that its proof is in time."""
-    if problem.path.blocked is Blocked.FAIL or deadline.end == np.inf:
+    if problem.path.blocked is Blocked.FAIL:
         return NO_LIMIT
-    return deadline.earlier((1.0 - SEARCH_SHARE) * deadline.left)
+    return deadline.share(SEARCH_SHARE)
 
 
 def _stations(corners: Corners, rows: Rows) -> tuple[FloatArray, BoolArray]:

@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.planner.largest_margin import told, widest
+from vdsm_pin.planner.largest_margin import IMPROVE_SHARE, widest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
+from vdsm_pin.planner.time_limit import with_share
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -31,13 +32,14 @@ def plan_paper_clearest(
         return replace(first, strategy=name)
     low = float(clearance(first.centres).min()) - kept
     high = float(clearance(first.centres[:1]).min()) - kept
-    plans, reserve = widest(
-        lambda more: plan_paper(problem, clearance, margin + more),
+    hurried = with_share(clearance, IMPROVE_SHARE)
+    found = widest(
+        lambda more: plan_paper(problem, hurried, margin + more),
         first,
         max(low, 0.0),
         high,
         rounds=ROUNDS,
         until=TOLERANCES.widest_region,
     )
-    notes = (*plans[-1].notes, told(kept + reserve))
-    return replace(plans[-1], strategy=name, notes=notes)
+    plan = found.plans[-1]
+    return replace(plan, strategy=name, notes=(*plan.notes, found.told(kept)))

@@ -1,0 +1,110 @@
+"""What has been found is handed out when the time is over, wherever that happens.
+
+The clock is replaced by a count: the n-th question about a clearance finds the time
+over, as do all that follow.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from vdsm_pin.errors import OutOfTime
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.fewest.levels import (
+    FULL,
+    QUICK,
+    Insert,
+    Search,
+    leaning,
+    pointed,
+)
+from vdsm_pin.planner.fewest.strategy import (
+    plan_clearest,
+    plan_fewest,
+)
+from vdsm_pin.planner.largest_margin import drawn_length, widest
+from vdsm_pin.planner.paper.clearest import plan_paper_clearest
+from vdsm_pin.planner.records import LinkClearance, Plan
+from vdsm_pin.problem.held import Axes
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.verify import verify
+
+Planner = Callable[[PlanningProblem, LinkClearance, FloatArray], Plan]
+NO_MARGIN = np.zeros(8)
+
+
+@dataclass
+class Counted:
+    """A clearance function whose time is over at a question."""
+
+    clearance: LinkClearance
+    last: float = np.inf
+    asked: int = field(default=0)
+
+    def __call__(self, centres: FloatArray, axes: Axes = None, /) -> FloatArray:
+        self.asked += 1
+        if self.asked >= self.last:
+            raise OutOfTime(0.5)
+        return self.clearance(centres, axes)
+
+
+def corner(name: str) -> PlanningProblem:
+    """A paper scene with a short piece of its path, to keep the test quick."""
+    task = read_problem(f"paper/{name}")
+    points = np.array([[3.126, 0.9, 0.9], [3.126, 1.0, 1.0]])
+    return replace(task, tip_path=replace(task.path, points=points, closed=False))
+
+
+def planned(planner: Planner, task: PlanningProblem, last: float) -> Plan | None:
+    try:
+        return planner(task, Counted(link_clearance(task), last), NO_MARGIN)
+    except OutOfTime:
+        return None
+
+
+@pytest.mark.parametrize("planner", [plan_fewest, plan_clearest, plan_paper_clearest])
+def test_more_time_never_loses_a_plan(planner: Planner) -> None:
+    task = corner("obs1")
+    counted = Counted(link_clearance(task))
+    whole = planner(task, counted, NO_MARGIN)
+    lasts = np.unique(np.linspace(1, counted.asked, 6).astype(int))
+    plans = [planned(planner, task, float(last)) for last in lasts]
+    there = [plan is not None for plan in plans]
+    assert there[-1] and there == sorted(there), there
+    # Of whoever goes on to look for a better one most of the time is after the first.
+    assert planner is plan_fewest or there.count(False) < len(there) / 2
+    for plan in filter(None, plans):
+        assert drawn_length(plan) == pytest.approx(drawn_length(whole), abs=1e-9)
+        assert verify(task, plan.trajectory).verdict is Verdict.CERTIFIED
+
+
+def test_an_improvement_that_takes_too_long_leaves_what_there_was() -> None:
+    task = corner("obs1")
+    first = plan_fewest(task, link_clearance(task), NO_MARGIN)
+    asked: list[float] = []
+
+    def plan_with(reserve: float) -> Plan:
+        asked.append(reserve)
+        if len(asked) == 2:
+            raise OutOfTime(0.5)
+        return first
+
+    found = widest(plan_with, first, 0.0, 0.008)
+    assert asked == [0.004, 0.006]
+    assert found.plans == [first, first] and not found.in_time
+    assert "time was over before plans that keep up to 12.000 mm" in found.told(0.004)
+
+
+def test_a_better_plan_is_looked_for_by_roadmaps_alone() -> None:
+    """To point, a margin that no arm has was looked for by every insertion there is."""
+    assert all(isinstance(level, Search) for level in pointed(QUICK).levels)
+    assert len(leaning(QUICK).levels) == 1
+    assert not pointed(QUICK).proves and not leaning(QUICK).proves
+    for effort in (pointed(FULL), leaning(FULL)):
+        inserts = [one for one in effort.levels if isinstance(one, Insert)]
+        assert inserts and all(one.directed for one in inserts) and effort.proves
