@@ -54,7 +54,9 @@ def circle_from(
             "circle, expected in it"
         )
         raise InvalidInput(message)
-    count = _steps(abs(turn), _widest_step(radius, tolerance))
+    # The chord of the widest step leaves the arc by the tolerance.
+    widest = 4.0 * asin(min(sqrt(0.5 * tolerance / radius), 0.25))
+    count = _steps(abs(turn), widest)
     angles = turn * np.arange(1, count + 1)[:, None] / count
     sideways = np.cross(axis, across)
     corners = centre + height * axis + np.cos(angles) * across
@@ -154,11 +156,6 @@ def _hermite(ends: FloatArray, tangents: FloatArray, tolerance: float) -> FloatA
     corners: FloatArray = p + basis[0] * (q - p) + basis[1] * u + basis[2] * v
     corners[-1] = q
     return corners
-
-
-def _widest_step(radius: float, tolerance: float) -> float:
-    """Angle whose chord leaves the arc by the tolerance; [rad]."""
-    return 4.0 * asin(min(sqrt(0.5 * tolerance / radius), 0.25))
 
 
 def _steps(whole: float, widest: float) -> int:

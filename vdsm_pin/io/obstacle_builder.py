@@ -14,7 +14,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
-from vdsm_pin.io.clouds import RawCloud, read_cloud
+from vdsm_pin.io.clouds import read_cloud
 from vdsm_pin.io.frames import Builder
 from vdsm_pin.io.mesh_file import MeshSize, read_mesh
 from vdsm_pin.io.motion_field import FLOATING, MotionModel, MovableModel
@@ -252,7 +252,9 @@ class ObstacleBuilder(Builder):
             fault = f"has no meaning: {model.file!r} is a grid, whose cells are `size`"
             raise self.invalid((*at, stray[0]), fault)
         points = points * edges if cloud.grid else points
-        size = MeshSize.of(points, model, self.frame, self._unit_of_grid(cloud))
+        # A grid is in the problem's unit, as the size of its cells.
+        unit = 1.0 / UNITS_PER_METRE[self.frame.unit] if cloud.grid else None
+        size = MeshSize.of(points, model, self.frame, unit)
         return solids.Voxels(
             model.name,
             self._placed(points, size, at),
@@ -261,10 +263,6 @@ class ObstacleBuilder(Builder):
             assumed_size="" if size.stated else size.shown,
             notes=cloud.notes,
         )
-
-    def _unit_of_grid(self, cloud: RawCloud) -> float | None:
-        """A grid is in the problem's unit, as the size of its cells; [m]."""
-        return 1.0 / UNITS_PER_METRE[self.frame.unit] if cloud.grid else None
 
     def _read(
         self,

@@ -1,7 +1,7 @@
 """Where an arm stands in a problem file, its start and its goal: to a `Posture`."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag
@@ -30,13 +30,9 @@ class StartJointsModel(FileModel):
     joints: JointsModel = Field(description="Joint values at the start.")
 
 
-def _list_or_not(value: Any) -> str:
-    return "point" if isinstance(value, list) else "joint values"
-
-
 Start: TypeAlias = Annotated[
     Annotated[Vector, Tag("point")] | Annotated[StartJointsModel, Tag("joint values")],
-    Discriminator(_list_or_not),
+    Discriminator(lambda at: "point" if isinstance(at, list) else "joint values"),
 ]
 
 

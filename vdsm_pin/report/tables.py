@@ -3,7 +3,6 @@
 import math
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields
 from functools import cache
 from itertools import accumulate
 from pathlib import Path
@@ -149,10 +148,7 @@ class ClearanceCsv:
         rest = np.flatnonzero(~self._written)
         for first in range(0, rest.size, _CHUNK):
             pairs = rest[first : first + _CHUNK]
-            values = (
-                getattr(least, one.name)[pairs] for one in fields(LeastClearances)
-            )
-            yield pairs, self._table(pairs, LeastClearances(*values))
+            yield pairs, self._table(pairs, least.of(pairs))
 
     def _table(self, pairs: IntArray, rows: LeastClearances) -> FloatArray:
         """Rows as numbers, of which each has a pair, shape (k, 12)."""

@@ -28,7 +28,7 @@ def read_mjcf(file: Path) -> tuple[Scene, tuple[Path, ...]]:
         fault = "MJCF needs mujoco: pip install 'vdsm-pin[mjcf]'"
         raise InvalidFile(file=file, fault=fault)
     check_is_file(file)
-    if not _is_text(str(file)):
+    if any("\ud800" <= sign <= "\udfff" for sign in str(file)):
         fault = "has a name that is not UTF-8 text, which mujoco does not open"
         raise InvalidFile(file=file, fault=fault)
     included = check_size(file)
@@ -48,10 +48,6 @@ def load_mujoco() -> Any:
 
     mujoco.set_mju_user_warning(logging.getLogger("mujoco").warning)
     return mujoco
-
-
-def _is_text(name: str) -> bool:
-    return not any("\ud800" <= sign <= "\udfff" for sign in name)
 
 
 def _solids(file: Path) -> list[Obstacle]:

@@ -17,7 +17,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.robots.mjcf import load_mujoco
 from vdsm_pin.simulation.feed_forward import Statics
 from vdsm_pin.simulation.plant import free_ends, plant_xml, stiffnesses
-from vdsm_pin.simulation.settings import Kick, Settings
+from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.simulation.time_law import row_times
 
 SLACK = 1.0
@@ -230,13 +230,10 @@ class _Loop:
         """Disturbing torques at a time, shape (1 + 2N,); [N m]."""
         torque = np.zeros(self._model.nv)
         for kick in self._settings.kicks:
-            begins = self._kick_time(kick)
+            begins = SETTLE + kick.share * float(self._row_times[-1] - SETTLE)
             if begins <= time < begins + kick.duration_s:
                 torque[2 * kick.joint - (kick.axis == "alpha")] += kick.torque_nm
         return torque
-
-    def _kick_time(self, kick: Kick) -> float:
-        return SETTLE + kick.share * float(self._row_times[-1] - SETTLE)
 
     def _recorded(
         self,

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Final, Literal
 
@@ -180,14 +181,8 @@ def summary(
         planned=cleared(problem, planned, ErrorBox()),
         executed=cleared(problem, found.trajectory, ErrorBox()),
         within_error_box=cleared(problem, planned, box),
-        versions=versions() | {"mujoco": _mujoco_version(), "urdf": model.urdf_sha256},
+        versions=versions() | {"mujoco": version("mujoco"), "urdf": model.urdf_sha256},
     )
-
-
-def _mujoco_version() -> str:
-    from importlib import metadata
-
-    return metadata.version("mujoco")
 
 
 def cleared(

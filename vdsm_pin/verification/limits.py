@@ -56,14 +56,6 @@ def _largest_change(path: Path) -> Largest:
     return found
 
 
-def _alpha(joints: FloatArray) -> FloatArray:
-    return np.abs(joints[:, 1::2])
-
-
-def _theta(joints: FloatArray) -> FloatArray:
-    return np.abs(joints[:, 2::2])
-
-
 def _psi(joints: FloatArray) -> FloatArray:
     """Link angles; where alpha or theta is past 90 deg, one of 90 deg lies on the way.
 
@@ -108,8 +100,8 @@ def arm_limits(arm: Manipulator, trajectory: Trajectory) -> list[Check]:
     path, count = trajectory.path, trajectory.alpha.size
     box, cone, checks = arm.max_joint_angle, arm.max_link_angle, []
     for name, symbol, limit, measure in (
-        ("alpha in its box", "alpha", box, _alpha),
-        ("theta in its box", "theta", box, _theta),
+        ("alpha in its box", "alpha", box, lambda q: np.abs(q[:, 1::2])),
+        ("theta in its box", "theta", box, lambda q: np.abs(q[:, 2::2])),
         ("link angle psi in its cone", "psi", cone, _psi),
     ):
         found = largest(pieces_of(path), measure, limit + TOLERANCES.joint_limit)

@@ -65,7 +65,7 @@ class PinocchioFrames:
 
     def origins(self, q: FloatArray) -> FloatArray:
         """The origins of the links alone, sooner, shape (n_rows, n_links, 3); [m]."""
-        return self._read(q, _origin).reshape(len(q), -1, 3)
+        return self._read(q, lambda frame: [frame.translation]).reshape(len(q), -1, 3)
 
     def _read(self, q: FloatArray, parts: Parts) -> FloatArray:
         """Some parts of each pose, one after the other, (n_rows, size of all)."""
@@ -87,10 +87,6 @@ class PinocchioFrames:
 def _pose(frame: Any) -> list[FloatArray]:
     """Rotation, column by column, and origin of a pinocchio.SE3."""
     return [frame.rotation.T.reshape(-1), frame.translation]
-
-
-def _origin(frame: Any) -> list[FloatArray]:
-    return [frame.translation]
 
 
 def read_model(text: str, *root: Any) -> Any:

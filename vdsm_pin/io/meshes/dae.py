@@ -110,7 +110,9 @@ class _Reader:
         for child in node:
             tag = _tag(child)
             if tag in _MOVES:
-                pose = composed(self._stream, pose, self._move(child))
+                count, matrix = _MOVES[tag]
+                move = matrix(self._floats(child.text or "", count))
+                pose = composed(self._stream, pose, move)
             elif tag in ("skew", "lookat"):
                 fault = f"places a part by <{tag}>, which is not read"
                 raise self._stream.invalid(fault)
@@ -125,11 +127,6 @@ class _Reader:
                 case "instance_controller":
                     fault = "is bent by a skin; export it as it stands"
                     raise self._stream.invalid(fault)
-
-    def _move(self, element: _Element) -> FloatArray:
-        kind = _tag(element)
-        count, matrix = _MOVES[kind]
-        return matrix(self._floats(element.text or "", count))
 
     def _put(self, geometry: _Element, pose: FloatArray) -> None:
         if geometry not in self._parts:
