@@ -755,7 +755,7 @@ def test_each_problem_of_a_batch_has_the_time_of_a_plan(
             for more in ((), ("--scheduler", "tcp://x:1"), ("--time-limit", "inf")):
                 vdsm(*words, *more)
     assert asked == [60.0, 600.0, math.inf, 600.0, 600.0, math.inf]
-    monkeypatch.setattr("vdsm_pin.app.first_plan.LIMIT", 0.001)
+    monkeypatch.setattr("vdsm_pin.app.first_plan.PLAN_LIMIT", 0.001)
     monkeypatch.setattr("vdsm_pin.app.first_plan.is_cold", lambda: False)
     ran = vdsm(*words, "--json")
     (row,) = json.loads(ran.out)

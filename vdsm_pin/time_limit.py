@@ -21,6 +21,10 @@ from typing import Final
 
 from vdsm_pin.errors import InvalidInput, OutOfTime
 
+PLAN_LIMIT: Final = 60.0
+COLD_PLAN_LIMIT: Final = 600.0
+"""Time to plan by default; more until a first plan has made the machine code; [s]."""
+
 
 @dataclass(frozen=True)
 class Deadline:

@@ -8,13 +8,10 @@ from pathlib import Path
 from typing import Final
 
 from vdsm_pin import kept
+from vdsm_pin.time_limit import COLD_PLAN_LIMIT, PLAN_LIMIT
 
 PLANNED: Final = "planned"
 """What is kept once a plan has been made to its end."""
-
-LIMIT: Final = 60.0
-COLD_LIMIT: Final = 600.0
-"""Seconds to plan by default; more until a first plan has made the machine code."""
 
 
 def is_cold() -> bool:
@@ -27,7 +24,7 @@ def is_cold() -> bool:
 
 def default_limit() -> float:
     """How long planning may take where nobody says it; [s]."""
-    return COLD_LIMIT if is_cold() else LIMIT
+    return COLD_PLAN_LIMIT if is_cold() else PLAN_LIMIT
 
 
 def note_planned() -> None:

@@ -21,6 +21,7 @@ from vdsm_pin.cli.options import (
     problems_from,
 )
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
+from vdsm_pin.time_limit import COLD_PLAN_LIMIT
 
 commands = family()
 
@@ -86,7 +87,7 @@ def batch(
     """
     import json
 
-    from vdsm_pin.app.first_plan import COLD_LIMIT, default_limit
+    from vdsm_pin.app.first_plan import default_limit
     from vdsm_pin.batch.folders import passed_over
     from vdsm_pin.batch.run import Batch, Interrupted, run_batch
     from vdsm_pin.batch.task import Settings
@@ -97,7 +98,7 @@ def batch(
     if slide_error_mm != "0":
         words += ("--slide-error-mm", slide_error_mm)
     if time_limit is None:  # machines of a cluster may have no machine code yet
-        time_limit = COLD_LIMIT if scheduler else default_limit()
+        time_limit = COLD_PLAN_LIMIT if scheduler else default_limit()
     settings = Settings(
         strategy=strategy,
         keep=keep,

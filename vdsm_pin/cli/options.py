@@ -15,6 +15,7 @@ from typer.core import TyperCommand
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.strategies import STRATEGIES
+from vdsm_pin.time_limit import COLD_PLAN_LIMIT, PLAN_LIMIT
 
 if TYPE_CHECKING:
     from vdsm_pin.problem.error_boxes import ErrorBox
@@ -121,7 +122,8 @@ PlanningTime = Annotated[
         min=0.001,
         metavar="SECONDS",
         help="When to give up, in a batch on each problem; inf for never. By default "
-        "60, and 600 for the first plan here (it compiles) and on a cluster.",
+        f"{PLAN_LIMIT:g}, and {COLD_PLAN_LIMIT:g} for the first plan here (it "
+        "compiles) and on a cluster.",
     ),
 ]
 TimeLimit = Annotated[
