@@ -28,7 +28,7 @@ from benchmarks.batch import write_problems
 from benchmarks.common import Results, described, save, surroundings, table
 from vdsm_pin.batch.cluster import LONGEST_ERRAND
 from vdsm_pin.batch.pool import Ended
-from vdsm_pin.batch.task import Done, Settings, Task
+from vdsm_pin.batch.task import Done, Task, TaskSettings
 from vdsm_pin.batch.worker import perform
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.summaries import write_columns
@@ -71,7 +71,7 @@ def one_problem(results: Results, folder: Path, count: int) -> BatchRow:
     rows, seconds, sizes, numbers = [], [], [], []
     for file in files:
         aside = folder / "aside" / file.stem
-        task = Task(str(file), folder / "x", aside, Settings("paper"))
+        task = Task(str(file), folder / "x", aside, TaskSettings("paper"))
         start = time.process_time()
         done = perform(task)
         seconds.append(time.process_time() - start)
@@ -88,7 +88,7 @@ def one_problem(results: Results, folder: Path, count: int) -> BatchRow:
     results["its folder, keep all [kB]"] = {
         "median": sorted(sizes)[len(sizes) // 2] / 1e3, "files": float(numbers[-1]),
     }  # fmt: skip
-    perform(replace(task, settings=Settings("paper", keep="none")))
+    perform(replace(task, settings=TaskSettings("paper", keep="none")))
     left = sum(path.stat().st_size for path in aside.iterdir())
     results["its folder, keep none, or failed where it passed [kB]"] = {
         "median": left / 1e3, "files": float(len(list(aside.iterdir()))),
@@ -157,7 +157,7 @@ def scheduling(results: Results, folder: Path, row: BatchRow, errands: int) -> N
     """Processor time of the scheduler for an errand."""
     tasks = tuple(
         Task(f"problems/small{k:05}.yaml", folder / f"small{k:05}",
-             folder / f"aside{k}", Settings("paper"))
+             folder / f"aside{k}", TaskSettings("paper"))
         for k in range(LONGEST_ERRAND)
     )  # fmt: skip
     with scheduler(folder, 2) as (client, pid):

@@ -22,7 +22,7 @@ import typer
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.batch.run import Batch, run_batch
-from vdsm_pin.batch.task import Settings
+from vdsm_pin.batch.task import TaskSettings
 from vdsm_pin.cli import app, main
 from vdsm_pin.cli.ending import fail
 from vdsm_pin.errors import NoPlanFound
@@ -376,7 +376,9 @@ def test_a_problem_without_path_is_verified_shown_and_planned_to_its_goal(
     assert ran.status == 2
     assert "move.yaml: tip_path: is missing; planning needs it" in one_message(ran)
     assert not (tmp_path / "plan").exists()
-    (row,) = run_batch(Batch((str(problem),), tmp_path / "batch", Settings("fewest")))
+    (row,) = run_batch(
+        Batch((str(problem),), tmp_path / "batch", TaskSettings("fewest"))
+    )
     assert (row.outcome, "tip_path: is missing" in row.reason) == ("error", True)
 
 

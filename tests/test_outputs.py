@@ -16,7 +16,7 @@ from vdsm_pin.app import arm_subject
 from vdsm_pin.app.workflow import planned_by
 from vdsm_pin.batch.folders import finished, folder_names
 from vdsm_pin.batch.run import OWN, Batch, run_batch, seconds_of
-from vdsm_pin.batch.task import MANIFEST, TIMING, Settings, Task
+from vdsm_pin.batch.task import MANIFEST, TIMING, Task, TaskSettings
 from vdsm_pin.batch.worker import perform
 from vdsm_pin.cli import main
 from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime
@@ -41,7 +41,7 @@ endloop
 endfacet
 endsolid part
 """
-FEWEST = Settings("fewest")
+FEWEST = TaskSettings("fewest")
 INPUTS = ("problem.yaml", "part.stl", "motion.csv", "plan.json")
 
 
@@ -217,7 +217,9 @@ def test_two_outputs_do_not_share_a_place(
 @pytest.mark.usefixtures("in_this_process")
 def test_a_problem_may_have_the_name_of_any_file_of_a_batch(here: Path) -> None:
     (here / "summary.csv.yaml").write_text(PROBLEM)
-    (row,) = run_batch(Batch(("summary.csv.yaml",), here / "out", Settings("fewest")))
+    (row,) = run_batch(
+        Batch(("summary.csv.yaml",), here / "out", TaskSettings("fewest"))
+    )
     assert row.outcome == "certified"
     assert (here / "out" / "summary.csv").is_file()
     assert (here / "out" / row.folder / "report.html").is_file()
@@ -239,12 +241,12 @@ def test_names_that_meet_a_hash_stay_apart() -> None:
 @pytest.mark.usefixtures("in_this_process")
 def test_a_batch_leaves_its_inputs_alone(here: Path) -> None:
     out = here / "out"
-    batch = Batch(("problem.yaml",), out, Settings("fewest"))
+    batch = Batch(("problem.yaml",), out, TaskSettings("fewest"))
     run_batch(batch)
     # A file of the batch that is read as a problem.
     shutil.copy("problem.yaml", out / ".lock")
     with pytest.raises(InvalidFile, match="is an input"):
-        run_batch(Batch((str(out / ".lock"),), out, Settings("fewest")))
+        run_batch(Batch((str(out / ".lock"),), out, TaskSettings("fewest")))
     assert (out / ".lock").read_text() == PROBLEM
     # A file beside results that would be replaced.
     (out / "problem" / "notes.txt").write_text("mine")
@@ -266,7 +268,7 @@ def test_long_and_odd_names_have_folders_of_their_own(here: Path) -> None:
     for name in names:
         (here / f"{name}.yaml").write_text(PROBLEM)
     rows = run_batch(
-        Batch(tuple(f"{n}.yaml" for n in names), here / "out", Settings("fewest"))
+        Batch(tuple(f"{n}.yaml" for n in names), here / "out", TaskSettings("fewest"))
     )
     assert [row.outcome for row in rows] == 4 * ["certified"]
     assert len({row.folder for row in rows}) == 4
@@ -331,5 +333,5 @@ def test_no_pipe_is_waited_for(here: Path) -> None:
 def test_a_batch_writes_over_no_table_of_others(here: Path) -> None:
     (here / "summary.csv").write_text("mine")
     with pytest.raises(InvalidFile, match="is not a result of a batch"):
-        run_batch(Batch(("problem.yaml",), here, Settings("fewest")))
+        run_batch(Batch(("problem.yaml",), here, TaskSettings("fewest")))
     assert (here / "summary.csv").read_text() == "mine"

@@ -15,7 +15,7 @@ from problem_files import NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.batch import cluster
 from vdsm_pin.batch.run import Batch, run_batch
-from vdsm_pin.batch.task import Settings, Task
+from vdsm_pin.batch.task import Task, TaskSettings
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.report.run_record import versions
 
@@ -80,7 +80,7 @@ def test_a_lost_worker_changes_no_byte(
     problems: Path, scheduler: str, tmp_path: Path
 ) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
-    run_batch(Batch((str(problems),), here, Settings("paper")))
+    run_batch(Batch((str(problems),), here, TaskSettings("paper")))
     workers = [worker(scheduler, tmp_path, "--no-nanny") for _ in range(3)]
     busy = threading.Event()
 
@@ -98,7 +98,7 @@ def test_a_lost_worker_changes_no_byte(
         killer = threading.Thread(target=kill_one)
         killer.start()
         rows = run_batch(
-            Batch((str(problems),), there, Settings("paper"), scheduler=scheduler)
+            Batch((str(problems),), there, TaskSettings("paper"), scheduler=scheduler)
         )
         killer.join()
         assert busy.is_set()
@@ -120,7 +120,7 @@ def test_a_worker_that_may_not_start_processes_is_told_how(
                 Batch(
                     (str(problems),),
                     tmp_path / "out",
-                    Settings("paper"),
+                    TaskSettings("paper"),
                     scheduler=scheduler,
                 )
             )
@@ -130,7 +130,7 @@ def test_a_worker_that_may_not_start_processes_is_told_how(
 
 def test_paths_start_from_the_folder_of_each_batch(tmp_path: Path) -> None:
     """Oracle: what each folder's file is, though one process reads them all."""
-    task = Task("p.yaml", tmp_path / "a", tmp_path / "b", Settings("paper"))
+    task = Task("p.yaml", tmp_path / "a", tmp_path / "b", TaskSettings("paper"))
     here = Path.cwd()
     for name in ("one", "two", "one"):
         folder = tmp_path / name
@@ -153,7 +153,7 @@ def test_no_scheduler_is_a_message(
     asked = Batch(
         ("paper/free",),
         tmp_path / "out",
-        Settings("paper"),
+        TaskSettings("paper"),
         scheduler="tcp://127.0.0.1:9",
     )
     with pytest.raises(InvalidInput, match="no Dask scheduler answers"):

@@ -11,7 +11,7 @@ from oracles.certificate_cases import certificate_lines
 from vdsm_pin.app.workflow import Verified, VerifyOrder
 from vdsm_pin.batch import worker as worker_module
 from vdsm_pin.batch.run import Batch, run_batch
-from vdsm_pin.batch.task import CERTIFICATE, Settings, Task
+from vdsm_pin.batch.task import CERTIFICATE, Task, TaskSettings
 from vdsm_pin.batch.worker import perform
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -45,10 +45,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-FEWEST = Settings("fewest")
+FEWEST = TaskSettings("fewest")
 
 
-def asked(folder: Path, settings: Settings = FEWEST) -> Batch:
+def asked(folder: Path, settings: TaskSettings = FEWEST) -> Batch:
     problems, plans = (str(folder / "cell.yaml"),), (str(folder / "plans"),)
     return Batch(problems, folder / "out", settings, quiet=True, trajectories=plans)
 
@@ -123,7 +123,7 @@ def test_what_changed_is_done_again(folder: Path) -> None:
     (folder / "plans" / "clear.csv").write_text(PLANS["through.csv"])
     after = {
         row.folder: row
-        for row in run_batch(asked(folder, Settings("fewest", resume=True)))
+        for row in run_batch(asked(folder, TaskSettings("fewest", resume=True)))
     }
     assert after["cell-clear"].outcome == "refuted"
     assert after["cell-through"] == before["cell-through"]
@@ -154,7 +154,7 @@ def test_what_changes_while_results_are_written_is_done_again(
 def test_errors_are_asked_about(folder: Path, degrees: float, passes: bool) -> None:
     """By 18.5 deg more the arm, 30 deg from the ball, comes nearer than 10 mm."""
     errors = ErrorBox(joint=radians(degrees))
-    rows = run_batch(asked(folder, Settings("fewest", errors=errors)))
+    rows = run_batch(asked(folder, TaskSettings("fewest", errors=errors)))
     outcomes = {row.folder: row.outcome for row in rows}
     assert (outcomes["cell-clear"] == "certified") is passes
 
@@ -162,7 +162,7 @@ def test_errors_are_asked_about(folder: Path, degrees: float, passes: bool) -> N
 @pytest.mark.usefixtures("in_this_process")
 def test_certificates_are_written_under_errors(folder: Path) -> None:
     errors = ErrorBox(joint=radians(1.0))
-    both = Settings("fewest", errors=errors, certificate=True)
+    both = TaskSettings("fewest", errors=errors, certificate=True)
     rows = {row.folder: row for row in run_batch(asked(folder, both))}
     assert rows["cell-clear"].outcome == "certified"
     lines = certificate_lines(folder / "out" / "cell-clear" / CERTIFICATE)

@@ -28,7 +28,7 @@ import vdsm_pin.batch.worker as worker_module
 from vdsm_pin.batch.folders import expanded, folder_names, passed_over
 from vdsm_pin.batch.pool import Ended
 from vdsm_pin.batch.run import Batch, Interrupted, run_batch
-from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Settings, Task
+from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Task, TaskSettings
 from vdsm_pin.batch.worker import perform
 from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, UnknownName
 from vdsm_pin.report.summaries import read_summary
@@ -51,7 +51,7 @@ def problems(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def reference(problems: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The batch done once, by one process."""
     folder = tmp_path_factory.mktemp("reference") / "out"
-    run_batch(Batch((str(problems),), folder, Settings("paper")))
+    run_batch(Batch((str(problems),), folder, TaskSettings("paper")))
     return folder
 
 
@@ -98,7 +98,7 @@ def test_a_problem_has_one_name_in_progress_table_junit_and_folder(
         ("paper/free", str(tmp_path / "stem.yaml"), "none.yaml"),
         tmp_path / "o",
     )
-    run_batch(Batch(given, out, Settings("paper")))
+    run_batch(Batch(given, out, TaskSettings("paper")))
     names = {"paper-free", "stem", "none"}
     assert {path.name for path in out.iterdir() if path.is_dir()} == names
     said = capsys.readouterr().out.splitlines()
@@ -117,7 +117,9 @@ def test_a_plan_that_draws_too_little_is_no_pass(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_problem(tmp_path / "wall.yaml", BEHIND_A_WALL)
-    asked = Batch((str(tmp_path / "wall.yaml"),), tmp_path / "out", Settings("fewest"))
+    asked = Batch(
+        (str(tmp_path / "wall.yaml"),), tmp_path / "out", TaskSettings("fewest")
+    )
     (row,) = run_batch(asked)
     assert row.outcome == "incomplete"
     assert "within the margin of 'wall'" in row.reason
@@ -142,7 +144,7 @@ def test_jobs_and_order_change_no_byte_and_rows_can_be_read_as_they_come(
     shown = contextlib.nullcontext(look)
     monkeypatch.setattr("vdsm_pin.batch.run.progress", lambda *_: shown)
     files = tuple(str(problems / f"{name}.yaml") for name in reversed(NAMES))
-    run_batch(Batch(files, out, Settings("paper"), jobs=2))
+    run_batch(Batch(files, out, TaskSettings("paper"), jobs=2))
     assert [len(rows) for rows in seen] == [1, 2, 3, 4]
     assert all(later[:-1] == sooner for sooner, later in pairwise(seen))
     assert tree(out) == tree(reference)
@@ -158,7 +160,7 @@ def test_resuming_keeps_what_is_intact_and_mends_the_rest(
     spoilt = out / "other" / "cables.csv"
     spoilt.write_bytes(spoilt.read_bytes().replace(b"1", b"2", 1))
     (out / "summary.csv").unlink()
-    run_batch(Batch((str(problems),), out, Settings("paper", resume=True)))
+    run_batch(Batch((str(problems),), out, TaskSettings("paper", resume=True)))
     kept = {line.split()[3] for line in capsys.readouterr().out.splitlines()
             if "(kept)" in line}  # fmt: skip
     assert kept == {"good", "far"}
@@ -202,7 +204,7 @@ def test_what_a_killed_batch_was_writing_is_gone_after_the_next(
     out = tmp_path / "out"
     shutil.copytree(reference, out)
     (out / ".unfinished" / "good").mkdir(parents=True)
-    run_batch(Batch((str(problems),), out, Settings("paper", resume=True)))
+    run_batch(Batch((str(problems),), out, TaskSettings("paper", resume=True)))
     assert tree(out) == tree(reference)
 
 
@@ -225,7 +227,7 @@ def test_a_full_disk_ends_the_batch_and_costs_no_earlier_result(
     shutil.copytree(reference, out)
     why = "File too large; 1 of 4 problems are finished, --resume does the rest"
     with pytest.raises(CannotWrite, match=why):
-        run_batch(Batch((str(problems),), out, Settings("paper")))
+        run_batch(Batch((str(problems),), out, TaskSettings("paper")))
     (out / "running.csv").unlink()
     assert tree(out) == tree(reference)
 
@@ -284,13 +286,13 @@ def test_ctrl_c_is_heard_even_where_python_loses_it(
     shown = contextlib.nullcontext(lose)
     monkeypatch.setattr("vdsm_pin.batch.run.progress", lambda *_: shown)
     with pytest.raises(Interrupted, match="1 of 4 problems"):
-        run_batch(Batch((str(problems),), tmp_path / "out", Settings("paper")))
+        run_batch(Batch((str(problems),), tmp_path / "out", TaskSettings("paper")))
     assert len(read_summary(tmp_path / "out" / "summary.csv")) == 1
 
 
 def test_a_time_limit_makes_a_row(problems: Path, tmp_path: Path) -> None:
     file = str(problems / "good.yaml")
-    (row,) = run_batch(Batch((file,), tmp_path, Settings("paper", time_limit=0.01)))
+    (row,) = run_batch(Batch((file,), tmp_path, TaskSettings("paper", time_limit=0.01)))
     assert (row.outcome, row.folder) == ("time-limit", "good")
     assert "0.01 s came first" in row.reason
     assert (tmp_path / "good" / "manifest.json").is_file()
@@ -309,7 +311,7 @@ def test_a_worker_that_never_asks_the_clock_ends_by_itself(
             file, place = str(problems / "good.yaml"), tmp_path / slow
             aside, settings = (
                 place.with_suffix(".part"),
-                Settings("paper", time_limit=0.05),
+                TaskSettings("paper", time_limit=0.05),
             )
             task = Task(file, place, aside, settings)
             row = perform(task).row
@@ -324,10 +326,10 @@ def test_what_is_not_a_result_is_never_overwritten(
     (tmp_path / "good").mkdir()
     (tmp_path / "good" / "thesis.txt").write_text("mine")
     with pytest.raises(InvalidFile, match="nothing was overwritten"):
-        run_batch(Batch((str(problems),), tmp_path, Settings("paper")))
+        run_batch(Batch((str(problems),), tmp_path, TaskSettings("paper")))
     assert [p.name for p in tmp_path.iterdir()] == ["good"]
     with pytest.raises(UnknownName, match="strategy"):
-        run_batch(Batch((str(problems),), tmp_path / "x", Settings("luck")))
+        run_batch(Batch((str(problems),), tmp_path / "x", TaskSettings("luck")))
     assert not (tmp_path / "x").exists()
 
 
@@ -335,7 +337,7 @@ def test_two_batches_do_not_share_a_folder(problems: Path, tmp_path: Path) -> No
     with (tmp_path / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         with pytest.raises(InvalidInput, match="another batch"):
-            run_batch(Batch((str(problems),), tmp_path, Settings("paper")))
+            run_batch(Batch((str(problems),), tmp_path, TaskSettings("paper")))
 
 
 def test_names_of_folders_depend_on_nothing_but_the_problem(tmp_path: Path) -> None:
@@ -403,7 +405,7 @@ def test_what_is_not_kept_leaves_its_row(
     problems: Path, reference: Path, tmp_path: Path, keep: str
 ) -> None:
     out = tmp_path / "out"
-    run_batch(Batch((str(problems),), out, Settings("paper", keep=keep)))
+    run_batch(Batch((str(problems),), out, TaskSettings("paper", keep=keep)))
     kept = sorted(path.name for path in (out / "good").iterdir())
     assert kept == ["manifest.json", "timing.json"]
     assert read_summary(out / "summary.csv") == read_summary(reference / "summary.csv")

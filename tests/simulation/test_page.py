@@ -9,7 +9,7 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.simulation.closed_loop import Simulation
 from vdsm_pin.simulation.feed_forward import Statics
-from vdsm_pin.simulation.page import assumptions, charts, thinned
+from vdsm_pin.simulation.page import assumptions, charts, thinned_run
 from vdsm_pin.simulation.settings import Cables, Settings
 
 HRM8 = built_in("hrm8")
@@ -56,7 +56,7 @@ def test_a_thinned_run_keeps_its_extremes_and_the_times_of_its_stiffness() -> No
     found = simulation(20_001)
     found.tensions[12_345, 3] = 7000.0
     found.executed[1_111, 4] += 9.0
-    few = thinned(found)
+    few = thinned_run(found)
     assert few.times.size < 3000
     assert (np.diff(few.times) > 0.0).all()
     assert few.tensions.max() == 7000.0

@@ -29,8 +29,8 @@ from vdsm_pin.batch.task import (
     TIMING,
     WRITTEN,
     Done,
-    Settings,
     Task,
+    TaskSettings,
     failed_row,
 )
 from vdsm_pin.batch.worker import perform
@@ -82,7 +82,7 @@ class Batch:
 
     problems: tuple[str, ...]
     folder: Path
-    settings: Settings
+    settings: TaskSettings
     jobs: int = 1
     scheduler: str | None = None
     quiet: bool = False

@@ -40,7 +40,7 @@ GIVEN: Final = "given"
 
 
 @dataclass(frozen=True)
-class Settings:
+class TaskSettings:
     """How each problem of a batch is done.
 
     Args:
@@ -85,7 +85,7 @@ class Task:
     problem: str
     final: Path
     staging: Path
-    settings: Settings
+    settings: TaskSettings
     trajectory: str | None = None
 
     @property

@@ -90,7 +90,7 @@ def batch(
     from vdsm_pin.app.first_plan import default_limit
     from vdsm_pin.batch.folders import passed_over
     from vdsm_pin.batch.run import Batch, Interrupted, run_batch
-    from vdsm_pin.batch.task import Settings
+    from vdsm_pin.batch.task import TaskSettings
     from vdsm_pin.report.words import outcome
     from vdsm_pin.text import printable
 
@@ -99,7 +99,7 @@ def batch(
         words += ("--slide-error-mm", slide_error_mm)
     if time_limit is None:  # machines of a cluster may have no machine code yet
         time_limit = COLD_PLAN_LIMIT if scheduler else default_limit()
-    settings = Settings(
+    settings = TaskSettings(
         strategy=strategy,
         keep=keep,
         errors=errors.box(slide_error_mm),

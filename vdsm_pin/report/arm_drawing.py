@@ -16,7 +16,7 @@ from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.charts import limit, packed, series
 from vdsm_pin.report.drawing import (
-    Part,
+    DrawnPart,
     Silhouette,
     obstacle_data,
     row_data,
@@ -138,7 +138,7 @@ class ArmDrawing:
         rows = self.trajectory.at(moments)
         return joint_centres(self.problem.manipulator, rows.x0, rows.alpha, rows.theta)
 
-    def parts(self, moments: FloatArray) -> list[Part]:
+    def parts(self, moments: FloatArray) -> list[DrawnPart]:
         """The links with tool and feed, and what they carry, at moments."""
         arm, rows = self.problem.manipulator, self.trajectory.at(moments)
         centres, turns = self.points(moments), link_frames(rows.alpha, rows.theta)
@@ -147,7 +147,7 @@ class ArmDrawing:
         solids += [(one, _DARK) for one in arm.carried]
         still = np.broadcast_to(np.eye(3), (len(moments), 3, 3))
         return [
-            Part(
+            DrawnPart(
                 solid.name,
                 surface(solid, 1.0, FINE),
                 colour,

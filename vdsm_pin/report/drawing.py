@@ -91,7 +91,7 @@ class Silhouette(NamedTuple):
     radius: float
 
 
-class Part(NamedTuple):
+class DrawnPart(NamedTuple):
     """What moves as one, and where it is at some moments.
 
     Args:
@@ -155,7 +155,7 @@ class Drawing(Protocol):
     def points(self, moments: FloatArray) -> FloatArray:
         """A point of every link at moments in waypoints, shape (n, k, 3); [m]."""
 
-    def parts(self, moments: FloatArray) -> list[Part]:
+    def parts(self, moments: FloatArray) -> list[DrawnPart]:
         """The links and what they carry at moments in waypoints."""
 
 

@@ -16,11 +16,11 @@ from vdsm_pin.report.rows import (
     ClosestRow,
     CounterexampleRow,
     ErrorBoxRow,
-    FileModel,
     Hashes,
     LeftOutRow,
     MinClearance,
     MotionFacts,
+    ResultModel,
     RobotFacts,
     ToleranceRow,
     VerdictWord,
@@ -49,7 +49,7 @@ _VERSIONS: Final = "of everything a number may depend on"
 _COMMAND: Final = "exact command line"
 
 
-class VerificationFile(FileModel):
+class VerificationFile(ResultModel):
     """verification.json."""
 
     vdsm_verification: Literal[1] = Field(
@@ -112,7 +112,7 @@ class VerificationFile(FileModel):
     command: str = Field(description=_COMMAND)
 
 
-class PlanFile(FileModel):
+class PlanFile(ResultModel):
     """plan.json."""
 
     vdsm_plan: Literal[1] = Field(default=1, description="version of this format")
@@ -145,7 +145,7 @@ class PlanFile(FileModel):
     command: str = Field(description=_COMMAND)
 
 
-class BatchRow(FileModel):
+class BatchRow(ResultModel):
     """One problem of a batch; what summary.csv shows."""
 
     folder: str = Field(
@@ -188,7 +188,7 @@ class BatchRow(FileModel):
     reason: str = Field(default="", description="the outcome in one sentence")
 
 
-class ManifestFile(FileModel):
+class ManifestFile(ResultModel):
     """manifest.json of one problem's folder; a folder with it is finished."""
 
     vdsm_manifest: Literal[1] = Field(default=1, description="version of this format")
@@ -198,7 +198,7 @@ class ManifestFile(FileModel):
     files: dict[str, str] = Field(description="SHA-256 by file name")
 
 
-class TimingFile(FileModel):
+class TimingFile(ResultModel):
     """timing.json of one problem's folder, the only file that differs between runs."""
 
     seconds: FiniteFloat = Field(description="time spent on the problem")
@@ -211,7 +211,7 @@ def _certificate_schema() -> dict[str, Any]:
     return certificate_schema()
 
 
-_MODELS: Final[dict[str, type[FileModel]]] = {
+_MODELS: Final[dict[str, type[ResultModel]]] = {
     "verification": VerificationFile,
     "plan": PlanFile,
     "manifest": ManifestFile,

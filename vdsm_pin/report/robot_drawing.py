@@ -17,7 +17,7 @@ from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.charts import packed, series
 from vdsm_pin.report.drawing import (
-    Part,
+    DrawnPart,
     Silhouette,
     obstacle_data,
     row_data,
@@ -144,11 +144,11 @@ class RobotDrawing:
         places, _ = self._frames(self.trajectory.at_moments(moments))
         return places.swapaxes(0, 1)
 
-    def parts(self, moments: FloatArray) -> list[Part]:
+    def parts(self, moments: FloatArray) -> list[DrawnPart]:
         """The links at moments in waypoints."""
         looks = self.names, self._skins, link_colours(len(self.names))
         rows = self._frames(self.trajectory.at_moments(moments))
-        return [Part(*one) for one in zip(*looks, *rows, strict=True)]
+        return [DrawnPart(*one) for one in zip(*looks, *rows, strict=True)]
 
     def charts(
         self, shown: Thinned, clearances: list[dict[str, Any]]

@@ -36,7 +36,7 @@ _COAL: Final = (
 CHANGED: Final = "number of changed link angles, mean over the length drawn"
 
 
-class FileModel(BaseModel):
+class ResultModel(BaseModel):
     """Common rules: no unknown keys, nothing changes after it is built."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
@@ -46,7 +46,7 @@ class FileModel(BaseModel):
         return self.model_dump_json(indent=2) + "\n"
 
 
-class CheckRow(FileModel):
+class CheckRow(ResultModel):
     """One check; `worst` and `limit` are in `unit`."""
 
     name: str = Field(description="what was checked")
@@ -79,7 +79,7 @@ class CheckRow(FileModel):
     deeper: bool = Field(description=f"of worst: {_DEEPER}")
 
 
-class ClosestRow(FileModel):
+class ClosestRow(ResultModel):
     """One closest approach, of a link to an obstacle or to another link."""
 
     interval: int = Field(
@@ -106,7 +106,7 @@ class ClosestRow(FileModel):
     coal_m: FiniteFloat | None = Field(default=None, description=_COAL)
 
 
-class MinClearance(FileModel):
+class MinClearance(ResultModel):
     """The smallest clearance from an obstacle in the whole motion."""
 
     lower_m: FiniteFloat | None = Field(description="proved lower bound")
@@ -122,7 +122,7 @@ class MinClearance(FileModel):
     coal_m: FiniteFloat | None = Field(default=None, description=_COAL)
 
 
-class LeftOutRow(FileModel):
+class LeftOutRow(ResultModel):
     """Two bodies of the arm that are not held apart."""
 
     body: str = Field(description="`link 1` and so on, `tool`, or a name of the URDF")
@@ -130,7 +130,7 @@ class LeftOutRow(FileModel):
     reason: str = Field(description="why they are not")
 
 
-class ObstacleErrorRow(FileModel):
+class ObstacleErrorRow(ResultModel):
     """How far one obstacle may be off."""
 
     name: str = Field(description="its name")
@@ -140,7 +140,7 @@ class ObstacleErrorRow(FileModel):
     )
 
 
-class JointErrorRow(FileModel):
+class JointErrorRow(ResultModel):
     """How far one joint of a robot may be off."""
 
     name: str = Field(description="its name")
@@ -148,7 +148,7 @@ class JointErrorRow(FileModel):
     shift_m: FiniteFloat = Field(description="of one that slides")
 
 
-class ErrorBoxRow(FileModel):
+class ErrorBoxRow(ResultModel):
     """The errors of the real motion that the clearance proof was asked to cover."""
 
     joint_error_rad: FiniteFloat = Field(
@@ -176,7 +176,7 @@ class ErrorBoxRow(FileModel):
     )
 
 
-class ErringJointRow(FileModel):
+class ErringJointRow(ResultModel):
     """A joint of a robot in a counterexample."""
 
     name: str = Field(description="as in the URDF")
@@ -194,7 +194,7 @@ class ErringJointRow(FileModel):
     )
 
 
-class CounterexampleRow(FileModel):
+class CounterexampleRow(ResultModel):
     """A motion within the error box that misses a required clearance."""
 
     moment: FiniteFloat = Field(description=f"when it does; {_MOMENT}")
@@ -230,14 +230,14 @@ class CounterexampleRow(FileModel):
     deeper: bool = Field(description=f"of clearance_m: {_DEEPER}")
 
 
-class ToleranceRow(FileModel):
+class ToleranceRow(ResultModel):
     """One tolerance in force."""
 
     value: FiniteFloat = Field(description="in `unit`")
     unit: str = Field(description="m, rad, - or those it serves")
 
 
-class MotionFacts(FileModel):
+class MotionFacts(ResultModel):
     """What the arm does over the motion; changed link angles at the waypoints."""
 
     waypoints: int = Field(description="rows of the trajectory")
@@ -258,7 +258,7 @@ class MotionFacts(FileModel):
     changed_angles_max: int = Field(description="most of them at any waypoint")
 
 
-class JointRow(FileModel):
+class JointRow(ResultModel):
     """One joint of a robot and where it goes over the motion."""
 
     name: str = Field(description="as in the URDF")
@@ -276,7 +276,7 @@ class JointRow(FileModel):
     )
 
 
-class RobotFacts(FileModel):
+class RobotFacts(ResultModel):
     """What a robot of a URDF does over the motion."""
 
     waypoints: int = Field(description="rows of the trajectory")
@@ -287,7 +287,7 @@ class RobotFacts(FileModel):
     joints: tuple[JointRow, ...] = Field(description="those that the motion moves")
 
 
-class Hashes(FileModel):
+class Hashes(ResultModel):
     """SHA-256 of the inputs; empty where there was none."""
 
     problem_sha256: str = Field(description="problem file and the meshes it names")
@@ -295,7 +295,7 @@ class Hashes(FileModel):
     urdf_sha256: str = Field(description="URDF of the arm or robot")
 
 
-class AdjustmentRow(FileModel):
+class AdjustmentRow(ResultModel):
     """A margin that was raised because a link missed the required clearance."""
 
     round: int = Field(description="after which round of planning, from 1")

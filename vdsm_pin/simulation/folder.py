@@ -17,7 +17,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.folder import check_outputs, staged
-from vdsm_pin.report.rows import FileModel, VerdictWord
+from vdsm_pin.report.rows import ResultModel, VerdictWord
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.terminal import show_facts
 from vdsm_pin.report.words import at_least, finite, outcome
@@ -42,14 +42,14 @@ BAND: Final = float(np.deg2rad(BAND_DEG))
 """The same in radians; [rad]."""
 
 
-class Cleared(FileModel):
+class Cleared(ResultModel):
     """A motion and what is proved of its clearance, the problem's errors included."""
 
     verdict: VerdictWord
     min_clearance_m: float | None = Field(description="proved; null: no obstacle")
 
 
-class SimulationFile(FileModel):
+class SimulationFile(ResultModel):
     """simulation.json."""
 
     vdsm_simulation: Literal[1] = Field(default=1, description="version of this format")

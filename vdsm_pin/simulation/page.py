@@ -30,7 +30,7 @@ def page(file: Any, found: Simulation, settings: Settings, required: float) -> s
         settings: What was assumed.
         required: Clearance that the problem asks for; [m].
     """
-    shown = thinned(found)
+    shown = thinned_run(found)
     plots = charts(shown, settings)
     clock = {
         "rows": packed(np.arange(shown.times.size), "<i4"),
@@ -48,7 +48,7 @@ def page(file: Any, found: Simulation, settings: Settings, required: float) -> s
     )
 
 
-def thinned(found: Simulation) -> Simulation:
+def thinned_run(found: Simulation) -> Simulation:
     """The run at few enough times to plot, those of every extreme among them."""
     n, stiffness = found.times.size, found.least_stiffness
     curves = np.hstack([found.executed, found.errors, found.tensions])

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.app.explanation import steps
-from vdsm_pin.app.explanation.parts import Moment, Part, mm, table
+from vdsm_pin.app.explanation.parts import Moment, Step, mm, table
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.paper.steps import PaperSteps
@@ -83,7 +83,7 @@ def _row(made: PaperSteps, waypoint: int | None) -> int:
     return waypoint
 
 
-def _checks(found: Refinement, row: int) -> Part:
+def _checks(found: Refinement, row: int) -> Step:
     """What others say of the same configuration."""
     plan, problem = found.plan, found.plan.problem
     one = plan.trajectory.part(row, row + 1)
@@ -96,7 +96,7 @@ def _checks(found: Refinement, row: int) -> Part:
             proved = at_least(float(low)), at_most(float(seen.upper[k]))
             rows.append((*arm.pairs.named(pair), mm(seen.distance[k]), *proved))
     head = ("link", "obstacle", "by Coal [mm]", "proved at least", "proved at most")
-    return Part(
+    return Step(
         "Checked",
         "section 6.3, Eq. 22–24",
         (

@@ -28,7 +28,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Part:
+class Step:
     """One step.
 
     Args:

@@ -4,7 +4,7 @@ import numpy as np
 
 from vdsm_pin.app.explanation import pictures
 from vdsm_pin.app.explanation.cross import NAMES, Cross, crosses
-from vdsm_pin.app.explanation.parts import Moment, Part, Table, at, deg, mm, name, table
+from vdsm_pin.app.explanation.parts import Moment, Step, Table, at, deg, mm, name, table
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import link_angles, position_angles
 from vdsm_pin.planner.feasibility import curled_reach, straight_reach
@@ -23,14 +23,14 @@ SCHEMES = {
 }
 
 
-def reach_step(moment: Moment) -> Part:
+def reach_step(moment: Moment) -> Step:
     """Step 1 (3.2, Eq. 4)."""
     problem = moment.plan.problem
     arm, path = problem.manipulator, problem.path
     places = np.vstack([path.start, path.points])
     farthest = float(np.hypot(places[:, 1], places[:, 2]).max())
     here = float(np.hypot(*moment.reference[-1]))
-    return Part(
+    return Step(
         "Step 1: can the path be reached?",
         "section 3.2, Eq. 4",
         (
@@ -44,10 +44,10 @@ def reach_step(moment: Moment) -> Part:
     )
 
 
-def projection_step(moment: Moment) -> Part:
+def projection_step(moment: Moment) -> Step:
     """Step 2 (3.3)."""
     tip = moment.steps.route.tip_path.points[moment.row]
-    return Part(
+    return Step(
         "Step 2: from 3D to 2D",
         "section 3.3",
         (
@@ -57,7 +57,7 @@ def projection_step(moment: Moment) -> Part:
     )
 
 
-def scaling_step(moment: Moment) -> Part:
+def scaling_step(moment: Moment) -> Step:
     """Step 3 (3.4-3.5, Eq. 5, 6)."""
     arm = moment.plan.problem.manipulator
     last = arm.n_links + 1
@@ -76,7 +76,7 @@ def scaling_step(moment: Moment) -> Part:
         (name("P", i + 1), f"{arm.ratios[i]:.4f}", *map(mm, moment.reference[i]))
         for i in range(last)
     ]
-    return Part(
+    return Step(
         "Step 3: scale the tip's path to the joints",
         "sections 3.4, 3.5, Eq. 5, 6",
         (words,),
@@ -85,7 +85,7 @@ def scaling_step(moment: Moment) -> Part:
     )
 
 
-def route_step(moment: Moment) -> Part:
+def route_step(moment: Moment) -> Step:
     """Step 4 (4.2)."""
     problem, route = moment.plan.problem, moment.steps.route
     tips = route.tip_path
@@ -116,7 +116,7 @@ def route_step(moment: Moment) -> Part:
         )
     words += [f"{note[:1].upper()}{note[1:]}." for note in route.notes]
     picture = made.svg("route of the tip, danger region of the tip")
-    return Part(
+    return Step(
         "Step 4: the path of the tip", "section 4.2", tuple(words), (), (picture,)
     )
 
@@ -126,7 +126,7 @@ def _tip_region(moment: Moment) -> list[DangerRegion]:
     return [avoidance.region] if isinstance(avoidance, AlongRail) else []
 
 
-def joints_step(moment: Moment) -> Part:
+def joints_step(moment: Moment) -> Step:
     """Step 5 (4.3, Eq. 8-10)."""
     title, source = "Step 5: the paths of the joints", "section 4.3, Eq. 8-10"
     avoidance = moment.steps.avoidance
@@ -135,7 +135,7 @@ def joints_step(moment: Moment) -> Part:
         rule, former = avoidance.rules[side], moment.steps.planar[moment.former]
         arm = moment.plan.problem.manipulator
         found = crosses(arm, rule, former, moment.planar)
-        return Part(
+        return Step(
             title,
             source,
             _cross_words(found, not rule.direction.any()),
@@ -145,7 +145,7 @@ def joints_step(moment: Moment) -> Part:
     if isinstance(avoidance, AcrossRail) and (moment.planar != moment.reference).any():
         return _bend_part(moment, avoidance, title, source)
     words = "Nothing is in the way of the straight arm here: Pᵢ is the reference."
-    return Part(title, source, (words,))
+    return Step(title, source, (words,))
 
 
 def _cross_words(found: tuple[Cross, ...], on_circles: bool) -> tuple[str, ...]:
@@ -191,7 +191,7 @@ def _cross_table(moment: Moment, found: tuple[Cross, ...]) -> Table:
     return table(head, rows)
 
 
-def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Part:
+def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Step:
     view = (0, 1 + rule.axis)
     arm, seen = moment.plan.problem.manipulator, list(view)
     made = pictures.canvas(moment, view, [rule.region])
@@ -206,7 +206,7 @@ def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Par
         for i in range(arm.n_links + 1)
     ]
     letter = "yz"[rule.axis]
-    return Part(
+    return Step(
         title,
         source,
         (
@@ -220,7 +220,7 @@ def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Par
     )
 
 
-def lift_step(moment: Moment) -> Part:
+def lift_step(moment: Moment) -> Step:
     """Step 6 (4.4, Eq. 7)."""
     arm, centres = moment.plan.problem.manipulator, moment.centres
     drawn = []
@@ -240,7 +240,7 @@ def lift_step(moment: Moment) -> Part:
         )
         for i in range(arm.n_links)
     ]
-    return Part(
+    return Step(
         "Step 6: from 2D to 3D",
         "section 4.4, Eq. 7",
         (
@@ -252,7 +252,7 @@ def lift_step(moment: Moment) -> Part:
     )
 
 
-def angles_step(moment: Moment) -> Part:
+def angles_step(moment: Moment) -> Step:
     """Step 7 (5.1, 5.2, Eq. 2, 3, 11-21)."""
     arm, rows = moment.plan.problem.manipulator, moment.steps.trajectory
     alpha, theta = rows.alpha[moment.row], rows.theta[moment.row]
@@ -274,7 +274,7 @@ def angles_step(moment: Moment) -> Part:
     head = ("link", "a [mm]", "b [mm]", "c [mm]", "a − straight", "b − straight",
             "c − straight")  # fmt: skip
     limit = float(np.rad2deg(arm.max_link_angle))
-    return Part(
+    return Step(
         "Step 7: joint angles and cable lengths",
         "sections 5.1, 5.2, Eq. 2, 3, 11–21",
         (

@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, ValidationError
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_quaternion
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, doubles
 from vdsm_pin.io.meshes.scene import Part, Placed, composed, strip_triangles
-from vdsm_pin.io.schema_types import LARGEST
+from vdsm_pin.io.schema_types import Number
 
 _LOOKS: Final = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
 _KNOWN: Final = frozenset({"KHR_mesh_quantization", "KHR_xmp_json_ld", "KHR_xmp"})
@@ -31,7 +31,6 @@ _NUMBERS: Final[dict[int, np.dtype[Any]]] = {
 _INDICES: Final = (5121, 5123, 5125)
 
 Count = Annotated[int, Field(ge=0, lt=1 << 32)]
-Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 
 
 class _View(BaseModel):
