@@ -51,6 +51,13 @@ class Tolerances:
     base_limit: float = _held(0.999e-9, "m")
     """Excess over the x0 range that counts as rounding of a CSV, as above; [m]."""
 
+    planned_limit: float = _held(5e-10, "m and rad")
+    """Excess over limits that counts as rounding where arms are planned; [m], [rad].
+
+    The verification allows twice as much. A start at the end of the rail, or bent as
+    far as may be, is not off by a rounding of 1e-15.
+    """
+
     changed_angle: float = _held(8.726646259971648e-4, "rad")
     """A link angle above this counts as changed: 0.05 deg; [rad]."""
 

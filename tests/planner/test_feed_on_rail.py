@@ -7,7 +7,7 @@ import pytest
 
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.mounted import Feed
-from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.planner.feed import within_feed
 from vdsm_pin.planner.records import Prepared
 from vdsm_pin.problem.desired_path import DesiredPath
@@ -19,7 +19,7 @@ FEED = Feed(0.8, 0.06)
 REQUIRED = 0.005
 
 
-def asked(arm: Manipulator, balls: tuple[Sphere, ...]) -> PlanningProblem:
+def asked(arm: Manipulator, balls: tuple[Box | Sphere, ...]) -> PlanningProblem:
     """To draw something, from where the straight arm has x0 = 0."""
     tip = np.array([arm.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None] + 0.1, False)
@@ -67,3 +67,22 @@ def test_without_a_feed_or_with_one_that_is_ignored_the_rail_stays() -> None:
         found = within_feed(Prepared(asked(arm, (ball,))))
         assert found.problem.manipulator.base_range == arm.base_range
         assert not found.notes
+
+
+@pytest.mark.parametrize("room", [0.0005, 0.002, 0.02])
+def test_a_guide_along_the_feed_hides_no_wall(room: float) -> None:
+    """Steps as long as the clearance allows never came past a guide of 0.5 mm."""
+    arm = replace(built_in("hrm8"), feed=FEED, base_range=(-5.0, 5.0))
+    half = np.array([10.0, 0.1, 0.05])
+    low = -FEED.radius - REQUIRED - room - half[2]
+    guide = Box("guide", np.array([0.0, 0.0, low]), np.eye(3), half)
+    wall = Box(
+        "wall", np.array([2.05, 0.0, 0.5]), np.eye(3), np.array([0.05, 1.0, 1.0])
+    )
+    ignoring = replace(
+        arm, ignore_pairs=tuple(("guide", f"link {k}") for k in range(1, 9))
+    )
+    found = within_feed(Prepared(asked(ignoring, (guide, wall))))
+    end = 2.0 - FEED.radius - REQUIRED
+    assert found.problem.manipulator.base_range[0] == -5.0
+    assert end <= found.problem.manipulator.base_range[1] < end + 2e-6

@@ -17,11 +17,8 @@ from vdsm_pin.planner.upper_clearance import feed_culprit
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
 
-STEPS: Final = 500
-"""Most steps towards one end of the rail; [-]."""
-
-LEAST_STEP: Final = 1e-6
-"""The last step, which leads to where the feed is too near; [m]."""
+FINE: Final = 1e-6
+"""How far beyond the place where it comes too near the rail may end; [m]."""
 
 
 def within_feed(known: Prepared) -> Prepared:
@@ -55,18 +52,22 @@ def _last_place(
 ) -> tuple[float, str] | None:
     """The x0 at which the feed is too near, and to what; None if none is on the way.
 
-    The clearance changes by no more than x0 does: it allows steps as long as it is more
-    than required (conservative advancement). Base and surfaces may be off in any
-    direction: by so much more is required. What turns add is left to the verification.
+    What the feed sweeps as it slides is as long and grows steadily: bisection. Base and
+    surfaces may be off in any direction: by so much more is required. What turns add is
+    left to the verification.
     """
-    errors, towards = problem.errors, float(np.sign(end - start[0]))
+    errors, clear = problem.errors, float(start[0])
     required = problem.required_clearance + errors.base + errors.obstacle
-    base = start.copy()
-    for step in range(STEPS):
-        near = feed_culprit(problem, base)
-        if near is None or (end - base[0]) * towards <= 0.0:
-            return None
+    found = feed_culprit(problem, start, end)
+    if not found.clearance < required:
+        return None
+    if feed_culprit(problem, start).clearance < required:
+        return None
+    while abs(end - clear) > FINE:
+        middle = (clear + end) / 2.0
+        near = feed_culprit(problem, start, middle)
         if near.clearance < required:
-            return (float(base[0]), near.obstacle) if step else None
-        base[0] += towards * max(near.clearance - required, LEAST_STEP)
-    return None
+            end, found = middle, near
+        else:
+            clear = middle
+    return end, found.obstacle

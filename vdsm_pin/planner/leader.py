@@ -78,9 +78,10 @@ def _check_rail(
         NoPlanFound: With where the tip is.
     """
     low, high = problem.manipulator.base_range
+    rounding = TOLERANCES.planned_limit
     placed = np.asarray(np.isfinite(centres).all(axis=(1, 2)))
     base = np.where(placed, centres[:, 0, 0], 0.0)
-    off: BoolArray = ~placed | (base < low) | (base > high)
+    off: BoolArray = ~placed | (base < low - rounding) | (base > high + rounding)
     if off.any():
         row = int(np.argmax(off))
         message = (
@@ -97,7 +98,7 @@ def _check_cone(problem: PlanningProblem, psi: FloatArray, tips: FloatArray) -> 
         NoPlanFound: With the joint, its angle and where the tip is.
     """
     arm = problem.manipulator
-    limit = arm.max_link_angle + TOLERANCES.joint_limit
+    limit = arm.max_link_angle + TOLERANCES.planned_limit
     if not (psi <= limit).all():
         row, joint = divmod(int(np.argmax(psi)), arm.n_links)
         message = (

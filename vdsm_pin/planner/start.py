@@ -114,7 +114,7 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
     if not clearance(centres[None]).min() >= required:
         raise _blocked(problem, culprit(problem, centres))
     feed = feed_culprit(problem, centres[0])
-    if feed and feed.clearance < required:
+    if feed.clearance < required:
         raise _blocked(problem, feed)
 
 

@@ -227,22 +227,27 @@ def culprit(problem: PlanningProblem, centres: FloatArray) -> Culprit:
     return _nearest_of(problem, upper_distances(problem, segments), radii, links)
 
 
-def feed_culprit(problem: PlanningProblem, base: FloatArray) -> Culprit | None:
+def feed_culprit(
+    problem: PlanningProblem, base: FloatArray, to: float | None = None
+) -> Culprit:
     """The obstacle nearest to the feed, of those that it is held apart from.
 
     Args:
         problem: Arm and scene.
         base: Where O_1 is, shape (3,); [m].
+        to: The x0 up to which the feed slides from there; None where it rests; [m].
 
     Returns:
-        None without a feed or such an obstacle.
+        At an infinite clearance without a feed or such an obstacle.
     """
     arm = problem.manipulator
     held = np.array([not arm.ignores(FEED, name) for name in problem.scene.names])
     if not arm.feed or not held.any():
-        return None
-    rear = base - np.array([arm.feed.length, 0.0, 0.0])
-    distances = upper_distances(problem, np.stack([rear, base])[None])
+        return Culprit(0, "", np.inf, deeper=False)
+    rear, front = base.copy(), base.copy()
+    slides = (base[0], base[0] if to is None else to)
+    rear[0], front[0] = min(slides) - arm.feed.length, max(slides)
+    distances = upper_distances(problem, np.stack([rear, front])[None])
     radii, link = np.where(held, arm.feed.radius, -np.inf)[None], np.zeros(1, np.int64)
     return _nearest_of(problem, distances, radii, link)
 

@@ -11,7 +11,7 @@ from scenes_for_fewest import problem
 
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres, link_angles
-from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.errors import Infeasible, NoPlanFound, NoWayOut
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Sphere
@@ -19,13 +19,15 @@ from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.planner.fewest import explore
 from vdsm_pin.planner.fewest.insertion import Inserted
 from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap
-from vdsm_pin.planner.fewest.start_node import with_start
+from vdsm_pin.planner.fewest.start_node import checked_start, with_start
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
 from vdsm_pin.planner.paper.pipeline import plan_paper
+from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Obstacle
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.verify import verify
@@ -194,4 +196,59 @@ def test_a_short_arm_with_every_way_blocked_is_refused_in_words(count: int) -> N
     ball = Sphere("ball", np.array([1.5, 0.0, 0.0]), 0.6)
     task = replace(problem(ball, points=POINTS), manipulator=arm)
     with pytest.raises(Infeasible, match="ball"):
+        plan_fewest(task, link_clearance(task), 0.0)
+
+
+@pytest.mark.parametrize("axis", ["alpha", "theta"])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("joint", range(0, 8, 3))
+def test_a_start_bent_as_far_as_may_be_moves_no_less_judged(
+    axis: str, sign: float, joint: int
+) -> None:
+    """In most of these the limit is passed by 1e-16 rad, and nothing was asked then."""
+    angles = {"alpha": np.zeros(8), "theta": np.zeros(8)}
+    angles[axis][joint] = sign * built_in("hrm8").max_link_angle
+    task = starting(built_in("hrm8"), angles["alpha"], angles["theta"])
+    centres = start_centres(task)
+    straight = np.zeros((1, 9, 2))
+    middle = (centres[-1] + centres[0] + [task.manipulator.total_length, 0, 0]) / 2.0
+    ball = Sphere("ball", middle, 0.05)
+    for blocked in (False, True):
+        held = replace(task, scene=Scene((ball,) if blocked else ()))
+        judge = Judge(held, link_clearance(held), 0.0, 1e-4, 1e-3)
+        tip = centres[None, -1]
+        offsets = checked_start(judge, tip, directed=False)[None]
+        clearances = judge.look(tip, offsets).clearances
+        assert (clearances > 0.01).all()
+        there = middle[None] + (middle - tip[0])
+        swing = Intervals(tip, there, offsets, straight)
+        assert judge.clear(swing, judge.needed_from(clearances)).all() == (not blocked)
+
+
+def test_no_start_that_breaks_a_limit_is_asked_for_less() -> None:
+    task = problem()
+    judge = Judge(task, link_clearance(task), 0.0, 0.0, 1e-3)
+    needed = judge.needed_from(np.array([-np.inf, -0.01, 0.001, 1.0]))
+    np.testing.assert_array_equal(needed, [0.0035, -0.01, 0.001, 0.0035])
+
+
+def test_a_start_at_the_end_of_the_rail_is_on_it() -> None:
+    """From the tip x0 comes out as -4e-16: the roadmap lost its first node."""
+    arm = replace(built_in("hrm8"), base_range=(0.0, 5.0))
+    for tip in ([3.126, 0.0, 0.0], [np.sqrt(3.126**2 - 0.13), 0.3, -0.2]):
+        task = replace(problem(points=POINTS, start=tuple(tip)), manipulator=arm)
+        far = Sphere("ball", np.array([2.0, -2.0, 0.0]), 0.1)
+        task = replace(task, scene=Scene((far,)))
+        plan = plan_fewest(task, link_clearance(task), 0.0)
+        assert verify(task, plan.trajectory).verdict is Verdict.CERTIFIED
+        assert abs(plan.trajectory.x0[0]) < 1e-9
+
+
+@pytest.mark.parametrize("start", [(20.0, 0.0, 0.0), (3.126, 3.2, 0.0)])
+def test_a_start_beyond_rail_or_reach_is_named(start: tuple[float, ...]) -> None:
+    task = problem(start=start)
+    expected = (
+        r"x0 is 16\.8740 m, the limit is" if start[0] > 10 else "beyond the reach"
+    )
+    with pytest.raises(Infeasible, match=expected):
         plan_fewest(task, link_clearance(task), 0.0)

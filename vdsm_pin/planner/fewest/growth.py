@@ -186,7 +186,7 @@ class Population:
         clearances[0] = max(clearances[0], root.clearances[0])
         looking = None if aims is None else np.stack([aims[:-1], aims[1:]], axis=1)
         lines = Intervals(tips[:-1], tips[1:], offsets[:-1], offsets[1:], looking)
-        need = np.minimum(judge.required, clearances[:-1])
+        need = judge.needed_from(clearances[:-1])
         good = (clearances[1:] >= judge.required) & judge.clear(lines, need)
         on = layer[1:][np.logical_and.accumulate(good)]
         # Nobody else is on record yet but the root.
@@ -225,8 +225,7 @@ class Population:
         looking = None if asked is None else np.tile(asked, (len(picked), 1, 1))
         before = self.grown.tips[parents], self.grown.offsets[parents]
         lines = Intervals(before[0], tips, before[1], offsets, looking)
-        # The start may be closer than the margin asks for.
-        need = np.minimum(required, self.grown.clearances[parents])
+        need = self.judge.needed_from(self.grown.clearances[parents])
         good = self.judge.clear(lines, need)
         layers, clearances = np.full(int(good.sum()), to), clearances[picked]
         return self._recorded(

@@ -223,7 +223,9 @@ class Judge:
         peak = bends_of(centres).max(axis=1)
         base = centres[:, 0, 0]
         low, high = manipulator.base_range
-        fine = (peak <= most) & (base >= low) & (base <= high)
+        rounding = TOLERANCES.planned_limit
+        fine = (peak <= most + rounding) & (base >= low - rounding)
+        fine &= base <= high + rounding
         clearances = np.full(asked.shape, np.inf)
         clearances[~fine] = -np.inf
         pieces, place = pieces_of(centres, knees, interval, asked & fine[:, None])
@@ -233,6 +235,15 @@ class Judge:
         if self.link_margins is not None:
             clearances -= self.link_margins
         return centres, clearances
+
+    def needed_from(self, clearances: FloatArray) -> FloatArray:
+        """Clearance that ways keep from where there is so much, shape (n,); [m].
+
+        The start may be closer than the margin asks for; the way out only gets better.
+        Where a limit is broken, -inf, all is asked for.
+        """
+        needed = np.minimum(self.required, clearances)
+        return np.where(clearances > -np.inf, needed, self.required)
 
     def clear(
         self,
@@ -333,7 +344,8 @@ class Judge:
         ahead = np.minimum(ends[0][:, -1, 0], ends[1][:, -1, 0])
         near = np.flatnonzero(kept & (ahead - arm.total_length < arm.base_range[0]))
         if near.size:
-            kept[near] = self._farthest_back(intervals, near) >= arm.base_range[0]
+            least = arm.base_range[0] - TOLERANCES.planned_limit
+            kept[near] = self._farthest_back(intervals, near) >= least
         return kept
 
     def _most_bent(
@@ -356,7 +368,7 @@ class Judge:
                 bent = bends_of(inner).max(axis=1)
                 more = bent > best[some]
                 at[some[more]], best[some[more]] = share[more], bent[more]
-            kept[best > most] = False
+            kept[best > most + TOLERANCES.planned_limit] = False
         return kept
 
     def _looking(self, intervals: Intervals) -> BoolArray:

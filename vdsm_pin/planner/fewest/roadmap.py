@@ -126,11 +126,13 @@ def build_roadmap(
     """
     problem, margins = judge.problem, judge.link_margins
     arm, aims = problem.manipulator, _aims(problem, route)
+    low, high = arm.base_range
+    rail = low - TOLERANCES.planned_limit, high + TOLERANCES.planned_limit
 
     def tried(whole: BoolArray) -> Roadmap:
         node, ends, bends = pose_shapes(
             route.tips, whole, shapes.knees, shapes.slopes, arm.stations, judge.limit,
-            arm.base_range,
+            rail,
         )  # fmt: skip
         if aims is not None:
             there, axes = aims[node // shapes.size], ends[:, 2] - ends[:, 1]

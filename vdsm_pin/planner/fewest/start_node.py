@@ -3,8 +3,9 @@
 import numpy as np
 
 from vdsm_pin.arm.kinematics import link_angles
-from vdsm_pin.errors import LimitExceeded, NoPlanFound, NoWayOut
+from vdsm_pin.errors import LimitExceeded, NoPlanFound, NoWayOut, OutOfReach
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
@@ -70,8 +71,7 @@ def with_start(
     lines = Intervals(
         every, every, np.broadcast_to(offsets, around[near].shape), around[near]
     )
-    # The start may be closer than the margin asks for; the way out only gets better.
-    need = np.minimum(judge.required, float(clearances[0])) * np.ones(len(near))
+    need = judge.needed_from(np.repeat(clearances, len(near)))
     good = judge.clear(lines, need) if len(near) else np.zeros(0, bool)
     if not good.any():
         raise NoWayOut(_kept_there(judge, float(clearances[0]), len(near)))
@@ -121,8 +121,32 @@ def largest_start_angle(problem: PlanningProblem) -> float:
     return float(link_angles(alpha, theta).max())
 
 
+def _check_placed(problem: PlanningProblem) -> None:
+    """Refuse a start that arm or rail do not allow.
+
+    Raises:
+        OutOfReach: If it is farther from the rail than the arm is long.
+        LimitExceeded: If its base is off the rail.
+    """
+    arm, start = problem.manipulator, problem.path.start
+    base, (low, high) = float(start_centres(problem)[0, 0]), arm.base_range
+    if np.isnan(base):
+        raise OutOfReach(
+            place=f"the start {problem.in_file(start)}",
+            distance=float(rail_distance(arm, start[None])[0]),
+            reach=arm.total_length,
+            reason="the length of the arm",
+        )
+    limit = min(max(base, low), high)
+    if abs(base - limit) > TOLERANCES.planned_limit:
+        raise LimitExceeded(
+            waypoint=0, quantity="x0", value=base, limit=limit, unit="m"
+        )
+
+
 def _check_limits(judge: Judge, tip: FloatArray, offsets: FloatArray) -> None:
     problem = judge.problem
+    _check_placed(problem)
     bend = float(judge.bends(tip, offsets).max())
     if not bend <= problem.manipulator.max_link_angle + TOLERANCES.joint_limit:
         limit = float(np.rad2deg(problem.manipulator.max_link_angle))

@@ -159,6 +159,8 @@ def cut_off(
     while True:
         deadline.check()
         start_node, goals = cells.holders(problem.path.start[None]), cells.holders(tips)
+        if start_node[0] < 0:  # no arm stands there
+            return np.zeros(len(tips), dtype=np.bool_)
         # A cell whose centre is clear hardly ever ends a way.
         light = np.where(cells.middle < 0.0, 1.0, LIGHT)
         doubt = np.where(cells.state == DOUBTFUL, cells.sizes() * light, 0.0)

@@ -11,6 +11,7 @@ from vdsm_pin.errors import LimitExceeded
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.tolerances import TOLERANCES
 
 
 def solve(manipulator: Manipulator, route: Route, centres: FloatArray) -> Trajectory:
@@ -49,6 +50,7 @@ def check_limits(
         LimitExceeded: With the worst waypoint, the joint, the value and the limit.
     """
     box, cone = manipulator.max_joint_angle, manipulator.max_link_angle
+    rounding = TOLERANCES.planned_limit
     psi = np.zeros_like(alpha)
     # psi is at most the root of alpha^2 + theta^2, as a sphere curves inwards.
     near = ~(alpha * alpha + theta * theta < cone * cone)
@@ -58,7 +60,7 @@ def check_limits(
         ("|theta|", np.abs(theta), box),
         ("|alpha|", np.abs(alpha), box),
     ):
-        if not (values <= limit).all():
+        if not (values <= limit + rounding).all():
             waypoint, joint = np.unravel_index(int(np.argmax(values)), values.shape)
             raise LimitExceeded(
                 waypoint=int(waypoint),
@@ -69,8 +71,8 @@ def check_limits(
             )
     low, high = manipulator.base_range
     for worst, limit, kept in (
-        (int(np.argmin(x0)), low, bool((x0 >= low).all())),
-        (int(np.argmax(x0)), high, bool((x0 <= high).all())),
+        (int(np.argmin(x0)), low, bool((x0 >= low - rounding).all())),
+        (int(np.argmax(x0)), high, bool((x0 <= high + rounding).all())),
     ):
         if not kept:
             value = float(x0[worst])
