@@ -148,11 +148,16 @@ class DesiredPath(ByValue):
         """
         if self.pointing is None:
             return np.full(tips.shape, np.nan)
-        if self.closed and self.length > 0.0:
-            stations = np.where(
-                stations > self.length, stations - self.length, stations
-            )
-        return self.pointing.aims(self.corner_stations, tips, stations)
+        return self.pointing.aims(self.corner_stations, tips, self.wrapped(stations))
+
+    def wrapped(self, stations: FloatArray) -> FloatArray:
+        """Stations within the path, shape (k,) to (k,); [m].
+
+        A closed path that is begun anywhere counts on past its length, up to twice it.
+        """
+        if not self.closed:
+            return stations
+        return np.where(stations > self.length, stations - self.length, stations)
 
     @cached_property
     def corners(self) -> FloatArray:

@@ -1,18 +1,22 @@
 """Pieces of the path in another order, against trying every order."""
 
 import itertools
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
+from vdsm_pin.errors import Infeasible
+from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.sequence import shortest_tour, tour_length
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem.desired_path import Order
+from vdsm_pin.problem.desired_path import Blocked, Order
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
@@ -68,3 +72,23 @@ def test_an_open_path_is_drawn_from_its_nearer_end_only_if_allowed() -> None:
     assert drawn[0] == pytest.approx(task.path.length)
     assert way_off_the_path(free) < 0.2 < way_off_the_path(given)
     assert (np.diff(given.trajectory.path_m[given.trajectory.on_path]) >= 0.0).all()
+
+
+def test_places_on_a_closed_path_are_told_within_it() -> None:
+    """Rows of a path that is entered at 1.4 m count on to 3.8 m, of 2.4 m."""
+    square = np.full((4, 3), 3.126)
+    square[:, 1:] = (0.3, 0.3), (0.3, -0.3), (0.9, -0.3), (0.9, 0.3)
+    task = problem(points=square, start=(3.126, 0.9, -0.1))
+    assert task.path.entry == pytest.approx(1.4)
+    ball = Sphere("ball", np.array([3.126, 0.3, 0.0]), 0.1)
+    task = replace(task, scene=Scene((ball,)))
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    told = [float(x) for x in re.findall(r"([\d.]+) mm", "".join(plan.undrawn))]
+    places = np.array(told) / 1e3
+    # The ball and what is kept of it: from 0.3 - r to 0.3 + r along the first side.
+    assert plan.undrawn and places.max() < 0.6
+    with pytest.raises(Infeasible, match=r"at 1\d\d\.\d+ mm along the path the tip"):
+        plan_fewest(
+            replace(task, tip_path=replace(task.path, blocked=Blocked.FAIL)),
+            link_clearance(task), 0.0,
+        )  # fmt: skip

@@ -365,7 +365,7 @@ def test_rows_crowd_where_a_stretched_arm_is_drawn_back() -> None:
     links = np.stack([np.tile([1.0, 0.0, 0.0], (arm.n_links, 1)), bent])
     corners = Corners(
         tips, links / np.linalg.norm(links, axis=2, keepdims=True), np.zeros(2),
-        np.zeros(1, dtype=np.bool_), np.full((1, 2), -1),
+        np.zeros(1, dtype=np.bool_),
     )  # fmt: skip
     turn, stray = np.deg2rad(4.9), 3e-4
     rows = dense_rows(arm, corners, 0.01, turn, stray)
@@ -385,9 +385,7 @@ def test_the_bound_of_the_tips_way_between_drawn_rows_is_within_the_spacing(
     offsets = np.zeros((2, arm.n_links + 1, 2))
     offsets[1, 1:-1:2, 0], offsets[1, 2:-1:2, 0] = 0.02, -0.02
     tips = np.array([[3.0, 0.0, 0.0], [3.0 + 2.0 * spacing, 0.0, 0.0]])
-    some = Corners(
-        tips, offsets, np.zeros(2), np.ones(1, dtype=np.bool_), np.full((1, 2), -1)
-    )
+    some = Corners(tips, offsets, np.zeros(2), np.ones(1, dtype=np.bool_))
     rows = dense_rows(arm, some, spacing, np.deg2rad(4.9), 1.0)
     _, bound = row_steps(arm, *joint_angles(arm, rows.centres))
     assert bound.max() <= spacing

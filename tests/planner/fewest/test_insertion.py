@@ -632,7 +632,7 @@ def test_knees_of_an_arm_whose_base_is_fixed_are_taken_away(drawn: bool) -> None
     centres = joint_centres(arm, np.zeros(5), alpha, theta)
     corners = Corners(
         centres[:, -1], coordinates(arm, centres, directed=True), np.arange(5.0),
-        np.full(4, drawn), np.full((4, 2), -1),
+        np.full(4, drawn),
     )  # fmt: skip
     judge = judge_of(task)
     fewer = sparser(judge, corners)

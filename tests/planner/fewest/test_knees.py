@@ -28,10 +28,10 @@ def test_knees_are_those_of_either_end_by_the_length_drawn() -> None:
     offsets[0, 3, 0] = offsets[1, 4, 0] = offsets[2, 3, 0] = 0.05
     tips = np.zeros((4, 3))
     stations, drawn = np.array([0.0, 3.0, 3.0, 4.0]), np.array([True, False, True])
-    corners = Corners(tips, offsets, stations, drawn, np.full((3, 2), -1))
+    corners = Corners(tips, offsets, stations, drawn)
     # Joints 3 to 5 and 4 to 6 over 3 m, 3 to 5 and none over 1 m.
     assert mean_knees(judge, corners) == pytest.approx((3.0 * 4 + 1.0 * 3) / 4.0)
-    resting = Corners(tips, offsets, stations, ~drawn & False, corners.edges)
+    resting = Corners(tips, offsets, stations, ~drawn & False)
     assert mean_knees(judge, resting) == pytest.approx((4 + 4 + 3) / 3.0)
 
 

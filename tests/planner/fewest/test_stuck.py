@@ -43,7 +43,6 @@ from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance
 
 HALF = 0.08
-ENDS = np.zeros((0, 2), dtype=np.int64)
 
 
 def wall(x: float, half: float) -> list[Obstacle]:
@@ -114,7 +113,7 @@ def test_a_stop_is_told_with_the_station_where_it_was() -> None:
     proof = prove_tips(task, clearance, rows.tips)
     route = tip_route(task, rows, proof.undrawable, 0.02, 0.0)
     still = np.zeros((0, 9, 2))
-    corners = Corners(np.zeros((0, 3)), still, np.zeros(0), proof.far[:0], ENDS)
+    corners = Corners(np.zeros((0, 3)), still, np.zeros(0), proof.far[:0])
     found = Found(route, corners, (len(route.layers) - 1,))
     judge = Judge(task, clearance, 0.0, 0.0, 1e-3)
     told = how_far(task, Explored(judge, found, rows, proof), Deadline(1.0, 0.0))

@@ -110,7 +110,7 @@ def _proved(problem: PlanningProblem, outcome: Explored) -> Infeasible:
         return _out_of_reach(problem, rows)
     if not proof.buried.any() and proof.hemmed_in.any():
         first = int(np.flatnonzero(proof.hemmed_in)[0])
-        return HemmedIn(station=float(rows.stations[first]))
+        return HemmedIn(station=_station(problem, rows.stations[first]))
     if not proof.buried.any():
         first = int(np.flatnonzero(proof.cut_off)[0])
         clearance = outcome.judge.clearance
@@ -118,15 +118,16 @@ def _proved(problem: PlanningProblem, outcome: Explored) -> Infeasible:
             problem, clearance, rows.tips[first], deadline_of(clearance)
         )
         words = "" if passed is None else passage(problem, passed.place)
-        return CutOff(station=float(rows.stations[first]), narrowest=words)
+        return CutOff(station=_station(problem, rows.stations[first]), narrowest=words)
     first = int(np.flatnonzero(proof.buried)[0])
     name, least = nearest(problem, rows.tips[first])
     least -= float(problem.manipulator.axis_radii[-1])
+    station = _station(problem, rows.stations[first])
     return PathBlocked(
         obstacle=name,
-        station=float(rows.stations[first]),
+        station=station,
         reason=(
-            f"at {in_mm(rows.stations[first])} along the path the tip itself would "
+            f"at {in_mm(station)} along the path the tip itself would "
             f"have at most {at_most_mm(least)} to it, required are "
             f"{in_mm(problem.required_clearance)}"
         ),
@@ -142,8 +143,9 @@ def _out_of_reach(problem: PlanningProblem, rows: PathRows) -> OutOfReach:
         distance, reach = rail_distance(arm, tips), arm.total_length
         reason = "the straight arm, the base at the end of its rail"
     worst = int(np.argmax(distance))
+    station = _station(problem, rows.stations[worst])
     return OutOfReach(
-        place=f"the tip at {in_mm(rows.stations[worst])} along the path",
+        place=f"the tip at {in_mm(station)} along the path",
         distance=float(distance[worst]),
         reach=reach,
         reason=reason,
@@ -157,14 +159,15 @@ def say_drawn(problem: PlanningProblem, outcome: Explored) -> None:
     drawn, length = _drawn(problem, outcome), problem.path.length
     corners = outcome.found.corners
     on = np.flatnonzero(corners.drawn)
-    changed = outcome.judge.look(corners.tips[on], corners.offsets[on]).changed
+    bends = outcome.judge.bends(corners.tips[on], corners.offsets[on])
+    most = int((bends > TOLERANCES.changed_angle).sum(axis=1).max())
     if length == 0.0:
-        say("reaches the goal, bending at most %d joints", int(changed.max()))
+        say("reaches the goal, bending at most %d joints", most)
         return
+    last = in_mm(_station(problem, corners.stations[1:][on].max()))
     say(
         "draws %s of %s of the path, up to %s along it, bending at most %d joints",
-        in_mm(drawn), in_mm(length), in_mm(float(corners.stations[1:][on].max())),
-        int(changed.max()),
+        in_mm(drawn), in_mm(length), last, most,
     )  # fmt: skip
 
 
@@ -190,7 +193,7 @@ def how_far(problem: PlanningProblem, outcome: Explored, deadline: Deadline) -> 
             tip = route.tips[route.layers[skipped[0]]]
     words = (
         f"drew {in_mm(drawn)} of {in_mm(problem.path.length)}; the first stretch not "
-        f"drawn begins at {in_mm(station)} along the path, tip "
+        f"drawn begins at {in_mm(_station(problem, station))} along the path, tip "
         f"{problem.in_file(tip)}"
     )
     rows = outcome.rows.tips[(stations >= station) & (stations <= stop)]
@@ -202,7 +205,7 @@ def how_far(problem: PlanningProblem, outcome: Explored, deadline: Deadline) -> 
         passed = narrowest_passage(problem, outcome.judge.clearance, tip, deadline)
         cause = _on_the_way(problem, passed, tip)
     told = f"{words}; {cause.words}" if cause.words else words
-    return replace(cause, words=told, station=station)
+    return replace(cause, words=told, station=_station(problem, station))
 
 
 def _on_the_way(
@@ -254,7 +257,7 @@ def notes_of(
     Returns:
         One sentence each.
     """
-    notes = _order(outcome)
+    notes = _order(problem, outcome)
     on_path = trajectory.on_path
     if not on_path.any():
         return tuple(notes)
@@ -318,13 +321,13 @@ def _farthest_back(
     return worst
 
 
-def _order(outcome: Explored) -> list[str]:
+def _order(problem: PlanningProblem, outcome: Explored) -> list[str]:
     """In which order and directions the pieces are drawn, where it is not as given."""
     assert outcome.found is not None
     ends = _pieces(outcome.found.corners)
     if all(np.diff(np.array(ends).ravel()) >= 0.0):
         return []
-    pieces = ", then ".join(f"from {in_mm(a)} to {in_mm(b)}" for a, b in ends)
+    pieces = ", then ".join(_stretch(problem, a, b) for a, b in ends)
     return [f"drawn in another order than given, as the problem allows: {pieces}"]
 
 
@@ -359,9 +362,20 @@ def undrawn(problem: PlanningProblem, outcome: Explored) -> tuple[str, ...]:
         why = "no way was found, which proves nothing"
         if route.undrawable[k]:
             why = f"proved: {_why_undrawable(problem, outcome, a, b)}"
-        stretches.append(f"from {in_mm(a)} to {in_mm(b)} along the path ({why})")
+        stretches.append(f"{_stretch(problem, a, b)} along the path ({why})")
         stretch = []
     return tuple(stretches)
+
+
+def _stretch(problem: PlanningProblem, a: float, b: float) -> str:
+    """Where a stretch of the path begins and ends, in words."""
+    a, b = (_station(problem, station) for station in (a, b))
+    return f"from {in_mm(a)} to {in_mm(b)}"
+
+
+def _station(problem: PlanningProblem, station: float) -> float:
+    """A station within the path, as problems count it; [m]."""
+    return float(problem.path.wrapped(np.array(station)))
 
 
 def _why_undrawable(

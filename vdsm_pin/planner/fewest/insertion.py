@@ -178,9 +178,10 @@ class _Search:
             if best is None or visit.last > best.last:
                 best = visit
             reached, part = visit.come
+            stations = self.judge.problem.path.wrapped(self.route.stations)
             say(
                 "an arm came %.0f %% of a way in, to %s along the path", 100.0 * part,
-                in_mm(float(self.route.stations[reached]) if reached >= 0 else 0.0),
+                in_mm(float(stations[reached]) if reached >= 0 else 0.0),
             )  # fmt: skip
             if best.last == k + len(path) - 1:
                 break
@@ -288,9 +289,7 @@ class _Search:
                 offsets.append(chain.offsets[-2::-1])
                 at.append(np.full(len(on) - 1, stations[left]))
                 drawn.append(np.zeros(len(on) - 1, dtype=np.bool_))
-        every = np.concatenate(drawn)
-        edges = np.full((len(every), 2), -1)
         return Corners(
-            np.concatenate(tips), np.concatenate(offsets), np.concatenate(at), every,
-            edges,
+            np.concatenate(tips), np.concatenate(offsets), np.concatenate(at),
+            np.concatenate(drawn),
         )  # fmt: skip

@@ -43,27 +43,21 @@ class Corners:
         stations: Arc length along the desired path, on ways that of the place left,
             shape (n,); [m].
         drawn: Whether the tip draws from corner k to k + 1, shape (n - 1,).
-        edges: Nodes joined by each interval, -1 where it is none of the graph's, shape
-            (n - 1, 2).
     """
 
     tips: FloatArray
     offsets: FloatArray
     stations: FloatArray
     drawn: BoolArray
-    edges: IntArray
 
     def take(self, kept: IntArray) -> "Corners":
         """Only these corners; an interval is drawn if all it replaces were."""
         drawn = [self.drawn[a:b].all() for a, b in itertools.pairwise(kept)]
-        whole = np.diff(kept) == 1
-        edges = np.where(whole[:, None], self.edges[kept[:-1]], -1)
         return Corners(
             self.tips[kept],
             self.offsets[kept],
             self.stations[kept],
             np.array(drawn, dtype=np.bool_),
-            edges,
         )
 
     def rerouted(
@@ -81,7 +75,6 @@ class Corners:
             with_those(self.offsets, offsets, end + 1),
             with_those(self.stations, np.append(np.full(count, left), come), end + 1),
             with_those(self.drawn, np.zeros(count, np.bool_), end),
-            with_those(self.edges, np.full((count, 2), -1), end),
         )
 
     def unit(self, manipulator: Manipulator) -> float:

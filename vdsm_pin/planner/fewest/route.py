@@ -98,8 +98,7 @@ def path_rows(path: DesiredPath) -> PathRows:
     corners = distinct(corners) if path.length > 0.0 else corners[[0, 0]]
     rows, corner = stepped(corners[:, None], path.spacing)
     stations = rows[:, 0]
-    wrapped = np.where(stations > path.length, stations - path.length, stations)
-    return PathRows(stations, path.at(wrapped), corner)
+    return PathRows(stations, path.at(path.wrapped(stations)), corner)
 
 
 def _layer_rows(rows: PathRows, undrawable: BoolArray, coarse: float) -> IntArray:

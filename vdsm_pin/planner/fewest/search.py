@@ -69,15 +69,18 @@ def search(
     """
     arm = judge.problem.manipulator
     sequences = SequenceSearch(roadmap, arm.total_length, start_node)
-    known: set[tuple[int, int]] = set()
+    known: set[tuple[int, ...]] = set()
     for _ in range(rounds):
         sequence = sequences.sequence()
         if not any(leg.drawn for leg in sequence.legs):
             return None
         if judge.problem.path.order is Order.FREE:
             sequence = reordered(sequences, sequence)
-        corners = _corners(arm, roadmap, sequence)
-        fresh = _fresh(corners.edges, known)
+        corners, nodes = _corners(arm, roadmap, sequence)
+        edges = np.sort(np.stack([nodes[:-1], nodes[1:]], axis=1), axis=1)
+        # Where the tip draws, the last link may have to look somewhere, besides.
+        keys = np.column_stack([edges, corners.drawn]).tolist()
+        fresh = np.array([k for k, key in enumerate(keys) if (*key,) not in known], int)
         good = (
             judge.clear(judge.lines(corners, fresh)) if fresh.size else np.ones(0, bool)
         )
@@ -87,13 +90,15 @@ def search(
                 roadmap.route, corners, sequence.skipped, roadmap, start_node,
                 sequences.from_start,
             )  # fmt: skip
-        known.update(_keys(corners.edges[fresh]))
-        sequences.block(corners.edges[bad], not corners.drawn[bad].all())
+        known.update(map(tuple, keys))
+        sequences.block(edges[bad], not corners.drawn[bad].all())
     return None
 
 
-def _corners(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> Corners:
-    """The corners of a sequence; a leg begins where the one before ends."""
+def _corners(
+    manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence
+) -> tuple[Corners, IntArray]:
+    """The corners of a sequence and their nodes; a leg begins where one ends."""
     nodes: list[int] = []
     stations: list[float] = []
     drawn: list[bool] = []
@@ -104,17 +109,5 @@ def _corners(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> 
         drawn += [leg.drawn] * (len(leg.nodes) - 1)
     number = np.array(nodes)
     tips, offsets = roadmap.poses_of(manipulator, number)
-    edges = np.stack([number[:-1], number[1:]], axis=1)
-    return Corners(
-        tips, offsets, np.array(stations), np.array(drawn, dtype=np.bool_), edges
-    )
-
-
-def _fresh(edges: IntArray, known: set[tuple[int, int]]) -> IntArray:
-    """Intervals whose edge has not been looked at."""
-    return np.array([k for k, e in enumerate(_keys(edges)) if e not in known], int)
-
-
-def _keys(edges: IntArray) -> list[tuple[int, int]]:
-    """Edges as pairs (low, high)."""
-    return [(a, b) for a, b in np.sort(edges, axis=1).tolist()]
+    on = np.array(drawn, dtype=np.bool_)
+    return Corners(tips, offsets, np.array(stations), on), number

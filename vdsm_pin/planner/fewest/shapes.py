@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def knee_joints(manipulator: Manipulator, most: int) -> IntArray:
         return np.arange(1, 1 + len(inner))
     wanted = np.linspace(inner[0], inner[-1], most)
     nearest = np.abs(inner[None, :] - wanted[:, None]).argmin(axis=1)
-    return np.asarray(1 + np.unique(nearest))
+    return np.asarray(1 + distinct(nearest))
 
 
 def slope_disc(limit: float, step: float) -> IntArray:

@@ -22,16 +22,11 @@ def _runs(corners: Corners) -> list[tuple[int, int]]:
 
 def _flattened(judge: Judge, corners: Corners, spans: list[tuple[int, int]]) -> Corners:
     """Corners with every span's inner corners on the line between its ends."""
-    tips, offsets, edges = (
-        corners.tips.copy(),
-        corners.offsets.copy(),
-        corners.edges.copy(),
-    )
+    tips, offsets = corners.tips.copy(), corners.offsets.copy()
     ways = _ways(judge, corners)
     for span in spans:
         _on_line(span, ways, corners.drawn, tips, offsets)
-        edges[slice(*span)] = -1
-    return replace(corners, tips=tips, offsets=offsets, edges=edges)
+    return replace(corners, tips=tips, offsets=offsets)
 
 
 def _ways(judge: Judge, corners: Corners) -> FloatArray:

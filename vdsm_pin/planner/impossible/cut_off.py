@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.impossible.octree import (
@@ -168,7 +168,7 @@ def cut_off(
         there = doubt_to(start_node, first, neighbours, doubt)
         need = np.where(goals >= 0, there[goals], 0.0)
         closed = ~np.isfinite(need)
-        open_ = np.unique(goals[(need > 0.0) & ~closed])
+        open_ = distinct(goals[(need > 0.0) & ~closed])
         if not open_.size or cells.codes.size > MOST_CELLS:
             return np.asarray(closed)
         through = there + doubt_to(open_, first, neighbours, doubt) - doubt

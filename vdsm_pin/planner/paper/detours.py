@@ -16,7 +16,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import PathBlocked
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
 from vdsm_pin.planner.paper.approach import first_station
 from vdsm_pin.planner.paper.danger_region import DangerRegion, Visit
 from vdsm_pin.planner.paper.project import project
@@ -62,7 +62,7 @@ def path_rows(path: DesiredPath, start: float, region: DangerRegion) -> Rows:
         middle = 0.5 * (within + without)
         hit = region.contains(project(rows_at(path, middle).points))
         within, without = np.where(hit, middle, within), np.where(hit, without, middle)
-    return rows_at(path, np.unique(np.concatenate([rows.stations, without])))
+    return rows_at(path, distinct(np.concatenate([rows.stations, without])))
 
 
 def detour_route(

@@ -104,9 +104,8 @@ def drawn_rows(path: DesiredPath, first: float) -> Rows:
 
 def rows_at(path: DesiredPath, stations: FloatArray) -> Rows:
     """Waypoints on the desired path at arc lengths from 0 to twice its length."""
-    wrapped = np.where(stations > path.length, stations - path.length, stations)
     side = np.zeros(len(stations), np.int64)
-    return Rows(path.at(wrapped), stations, True, side)
+    return Rows(path.at(path.wrapped(stations)), stations, True, side)
 
 
 def off_path_rows(
@@ -169,8 +168,7 @@ def join(path: DesiredPath, parts: list[Rows], notes: tuple[str, ...] = ()) -> R
         begin = 1 if k > 0 else 0
         end = len(rows) - (1 if k + 1 < len(parts) else 0)
         kept.append(rows.part(begin, end - 1, rows.side[begin:end]))
-    stations = np.concatenate([rows.stations for rows in kept])
-    stations = np.where(stations > path.length, stations - path.length, stations)
+    stations = path.wrapped(np.concatenate([rows.stations for rows in kept]))
     on_path = np.concatenate([np.full(len(rows), rows.on_path) for rows in kept])
     points = np.concatenate([rows.points for rows in kept])
     side = np.concatenate([rows.side for rows in kept])
@@ -220,5 +218,5 @@ def subdivided(path: DesiredPath, route: Route, pieces: IntArray) -> Route:
     on_path |= (part == 0.0) & tip.on_path[begin]
     side = np.where(route.side[begin] != 0, route.side[begin], route.side[end])
     stations = np.where(on_path | (part == 0.0), stations, tip.path_m[begin])
-    stations = np.where(stations > path.length, stations - path.length, stations)
-    return replace(route, tip_path=TipPath(points, on_path, stations), side=side)
+    tip = TipPath(points, on_path, path.wrapped(stations))
+    return replace(route, tip_path=tip, side=side)
