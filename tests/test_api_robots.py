@@ -123,7 +123,7 @@ def test_what_is_read_can_be_judged_and_written_and_read_again(
     first.write_text("turn_deg\n0\n1800\n")
     still = vp.JointTrajectory(SWEEP.names, SWEEP.q, rates=np.zeros((2, 1)))
     for motion in (vp.read_trajectory(first, turned), still):
-        judged = vp.verify(turned, motion).motion
+        judged = vp.verify(turned, motion).trajectory
         assert judged is not None
         assert judged.q.tolist() == motion.q.tolist()
         vp.write_trajectory(again, motion, turned)

@@ -14,7 +14,6 @@ from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
@@ -87,8 +86,10 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
         scene: As the proof reads it.
     """
     rows = np.array(plan.waypoints)
-    motion = Motion(rows)
-    verify_robot(Cell(robot, scene), Motion(rows[:1]))  # compiled, nothing kept
+    joints = tuple(joint.name for joint in robot.joints)
+    motion = JointTrajectory(joints, rows)
+    first = JointTrajectory(joints, rows[:1])
+    verify_robot(Cell(robot, scene), first)  # compiled, nothing kept
     spent = inf
     for _ in range(RUNS):
         begin = time.process_time()
@@ -101,7 +102,7 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     states = [_samples(rows, count) for count in _counts(sampled, float(extent))]
     hits = [[q for q in some if sampled.collides(q)] for some in states]
     least = min((sampled.clearance(q) for q in hits[-1]), default=0.0)
-    near = sampled.clearance(_witness(found, motion))
+    near = sampled.clearance(_witness(found))
     seconds, fault = nan, _fault(sampled, rows, verdict, bool(hits[-1]), near)
     if verdict is Verdict.REFUTED:
         seconds, repaired = _repair(cell, motion)
@@ -117,15 +118,13 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     )
 
 
-def _repair(cell: Cell, motion: Motion) -> tuple[float, FloatArray]:
+def _repair(cell: Cell, motion: JointTrajectory) -> tuple[float, FloatArray]:
     """Processor time of a repair, inf where there is none, and its waypoints."""
     begin = time.process_time()
     try:
-        joints = tuple(joint.name for joint in cell.robot.joints)
-        given = JointTrajectory(joints, motion.knots, motion.times)
-        repaired = repair_robot(cell, given).verification.trajectory.knots
+        repaired = repair_robot(cell, motion).trajectory.q
     except Infeasible:
-        return inf, np.zeros((0, motion.knots.shape[1]))
+        return inf, np.zeros((0, motion.q.shape[1]))
     return time.process_time() - begin, repaired
 
 
@@ -152,10 +151,11 @@ def _samples(
     return np.concatenate(rows)
 
 
-def _witness(found: RobotVerification, motion: Motion) -> FloatArray:
+def _witness(found: RobotVerification) -> FloatArray:
     """The configuration at which the proof finds two bodies nearest; [rad]."""
     worst = [int(np.argmin(found.least.upper))]
-    return motion.within(found.least.interval[worst], found.least.share[worst])[0]
+    least, path = found.least, found.trajectory.path
+    return path.within(least.interval[worst], least.share[worst])[0]
 
 
 def _fault(

@@ -14,7 +14,7 @@ from oracles.certificate_cases import (
     check_sealed,
     write_cube,
 )
-from oracles.shortcuts import read_path
+from oracles.shortcuts import read_rows
 
 from vdsm_pin.certificate_checker import Outcome
 from vdsm_pin.certificate_writer.certificate import write_certificate
@@ -141,7 +141,7 @@ class Made:
     def verified(self) -> RobotVerification:
         self.write()
         cell = read_cell(self.files[0])
-        return verify_robot(cell, read_path(self.files[1], cell.robot))
+        return verify_robot(cell, read_rows(self.files[1], cell.robot))
 
     def is_certified(self) -> bool:
         return self.verified().verdict is Verdict.CERTIFIED

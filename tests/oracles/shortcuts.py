@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path as File
 
 from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, ErrorBox, PairTable
 from vdsm_pin.proof.budget import Budget
@@ -36,6 +37,18 @@ def read_scene(path: File, robot_size: float) -> Scene:
     return read_scene_with_files(path, robot_size)[0]
 
 
+def named(path: Path) -> JointTrajectory:
+    """The rows of a path that straight lines join, by any names."""
+    assert path.degree == 1
+    columns = range(path.knots.shape[1])
+    return JointTrajectory(tuple(map(str, columns)), path.knots, path.times)
+
+
+def read_rows(file: File, robot: Robot, topic: str | None = None) -> JointTrajectory:
+    """The trajectory of a robot in a file."""
+    return read_motion(file, robot.joints, topic, robot.values)
+
+
 def read_path(file: File, robot: Robot, topic: str | None = None) -> Path:
     """A trajectory as the controller of a robot runs it."""
-    return joint_path(file, read_motion(file, robot.joints, topic, robot.values))
+    return joint_path(file, read_rows(file, robot, topic))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles.shortcuts import read_path
+from oracles.shortcuts import named, read_path
 from typer.testing import CliRunner
 
 from vdsm_pin.cli import app
@@ -67,10 +67,10 @@ def test_grazing_motion_is_repaired(tmp_path: Path) -> None:
     """The repaired motion keeps its ends, and dense samples by Coal keep clearance."""
     x, y = tip_at(0.6, 0.3)
     this = asked(tmp_path, (1.04 * x, 1.04 * y, 0.03))
-    assert verify_robot(this, Motion(OVER)).verdict == "refuted"
+    assert verify_robot(this, named(Motion(OVER))).verdict == "refuted"
     found = repair_robot(this, rows_of(OVER))
     assert found.verification.verdict == "certified"
-    rows = found.verification.trajectory.knots
+    rows = found.verification.trajectory.q
     assert rows[[0, -1]].tolist() == OVER.tolist()
     assert found.given[[0, -1]].tolist() == [0, 1]
     assert 0.0 < found.moved.max() < 0.2
@@ -87,9 +87,9 @@ def test_errors_are_kept_in_reserve(tmp_path: Path) -> None:
     """A motion that is clear only without errors is moved until it is with them."""
     x, y = tip_at(0.6, 0.3)
     this = asked(tmp_path, (1.1 * x, 1.1 * y, 0.05))
-    assert verify_robot(this, Motion(OVER)).verdict == "certified"
+    assert verify_robot(this, named(Motion(OVER))).verdict == "certified"
     errors = TypedErrorBox(joint_deg=0.5, base_mm=20.0, base_deg=0.5)
-    assert verify_robot(this.under(errors), Motion(OVER)).verdict != "certified"
+    assert verify_robot(this.under(errors), named(Motion(OVER))).verdict != "certified"
     found = repair_robot(this.under(errors), rows_of(OVER))
     assert found.verification.verdict == "certified"
     assert found.verification.errors == ErrorBox().widened(errors)
@@ -106,14 +106,14 @@ def test_smooth_motion_is_repaired_as_a_smooth_one(tmp_path: Path, degree: int) 
     if degree == 5:
         more["changes"] = np.array([[0.0, 0.0], [0.01, 0.0]])
     given = rows_of(OVER, **more)
-    assert verify_robot(this, given.path).verdict == "refuted"
+    assert verify_robot(this, given).verdict == "refuted"
     found = repair_robot(this, given)
     motion = found.trajectory
     assert found.verification.verdict == "certified"
-    assert found.verification.motion is motion
+    assert found.verification.trajectory is motion
     assert motion.rates is not None
     assert motion.path.degree == degree
-    assert motion.path.same_as(found.verification.trajectory)
+    assert motion.path.same_as(found.verification.trajectory.path)
     assert motion.q[[0, -1]].tolist() == OVER.tolist()
     assert motion.rates[[0, -1]].tolist() == rates.tolist()
     assert 0.0 < found.moved.max() < 0.3
@@ -133,7 +133,7 @@ def test_smooth_motion_is_repaired_as_a_smooth_one(tmp_path: Path, degree: int) 
 def test_certified_motion_stays(tmp_path: Path) -> None:
     """Nothing is changed where nothing is wrong."""
     found = repair_robot(asked(tmp_path, (5.0, 5.0, 0.1)), rows_of(OVER))
-    assert found.verification.trajectory.knots.tolist() == OVER.tolist()
+    assert found.verification.trajectory.q.tolist() == OVER.tolist()
     assert not found.moved.any()
 
 

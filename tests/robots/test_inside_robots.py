@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from oracles.shortcuts import read_path, read_scene
+from oracles.shortcuts import named, read_rows, read_scene
 
 from tests.oracles.certificate_cases import certificate_lines
 from tests.oracles.certificate_oracle import sealed
@@ -52,7 +52,7 @@ def cell_in(folder: Path, mesh: Any, more: str = "") -> Cell:
 
 
 def judged(cell: Cell, folder: Path) -> RobotVerification:
-    return verify_robot(cell, read_path(folder / "t.csv", cell.robot))
+    return verify_robot(cell, read_rows(folder / "t.csv", cell.robot))
 
 
 def winding(mesh: Any, point: FloatArray) -> float:
@@ -141,10 +141,10 @@ def test_a_mesh_that_moves_over_a_link_is_refuted(tmp_path: Path) -> None:
     motion = ", motion: {times_s: [0, 1], positions: [[0.5, 0, 0], [0.6, 0, 0]]}"
     cell = cell_in(tmp_path, box, motion)
     q, times = np.array([[0.0], [0.1]]), np.array([0.0, 1.0])
-    assert verify_robot(cell, Motion(q, times=times)).verdict is Verdict.REFUTED
+    assert verify_robot(cell, named(Motion(q, times=times))).verdict is Verdict.REFUTED
     away = cell_in(tmp_path, box, motion.replace("0.5, 0, 0]", "-0.5, 0, 0]"))
     late = Motion(q, times=np.array([-2.0, -1.0]))
-    assert verify_robot(away, late).verdict is Verdict.CERTIFIED
+    assert verify_robot(away, named(late)).verdict is Verdict.CERTIFIED
 
 
 def test_the_checker_asks_for_the_inside_too(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles.shortcuts import read_path
+from oracles.shortcuts import named, read_rows
 
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
@@ -75,7 +75,7 @@ def test_clearances_are_those_of_dense_samples(seed: int, tmp_path: Path) -> Non
     rows, knots = rng.uniform(-2.0, 2.0, (4, 2)), rng.uniform(-1.0, 1.0, (3, 3))
     times, moves = np.array([0.0, 1.0, 1.5, 4.0]), np.array([0.5, 1.25, 3.0])
     cell = cell_with(tmp_path, moves, knots)
-    result = verify_robot(cell, Motion(rows, times=times))
+    result = verify_robot(cell, named(Motion(rows, times=times)))
     at = np.linspace(0.0, 4.0, 40_001)
     truth = gaps(along(times, rows, at), along(moves, knots, at))
     for pair, low, high, verdict in zip(
@@ -106,9 +106,10 @@ def test_a_ball_too_early_is_refuted_and_in_time_is_not(tmp_path: Path) -> None:
     rows, times = np.array([[0.0, 0.0], [np.pi / 2, 0.0]]), np.array([0.0, 1.0])
     drop = np.array([[0.9, 0.0, 0.5], [0.9, 0.0, 0.0]])
     late = cell_with(tmp_path, np.array([0.5, 1.0]), drop)
-    assert verify_robot(late, Motion(rows, times=times)).verdict is Verdict.CERTIFIED
+    motion = named(Motion(rows, times=times))
+    assert verify_robot(late, motion).verdict is Verdict.CERTIFIED
     early = cell_with(tmp_path, np.array([-1.0, 0.0]), drop)
-    result = verify_robot(early, Motion(rows, times=times))
+    result = verify_robot(early, motion)
     assert result.verdict is Verdict.REFUTED
     assert result.closest(1)[0].pair.obstacle == "ball"
     row = next(check for check in result.checks if check.name == CheckKind.OBSTACLES)
@@ -121,7 +122,7 @@ def test_errors_of_a_robot_beside_what_moves_are_covered(tmp_path: Path) -> None
     moves, knots = np.array([0.2, 1.4]), rng.uniform(-1.0, 1.0, (2, 3))
     box = TypedErrorBox(joint_deg=2.0, obstacle_mm=3.0)
     cell = cell_with(tmp_path, moves, knots).under(box)
-    result = verify_robot(cell, Motion(rows, times=times))
+    result = verify_robot(cell, named(Motion(rows, times=times)))
     at = np.linspace(0.0, 2.0, 5_001)
     q, ball, worst = along(times, rows, at), along(moves, knots, at), np.full(2, np.inf)
     for signs in np.array([*np.ndindex(3, 3)]) - 1.0:
@@ -149,7 +150,7 @@ def test_certificates_beside_what_moves(seed: int, tmp_path: Path) -> None:
     cell = cell_with(tmp_path, moves, knots)
     if seed % 2:
         cell = cell.under(TypedErrorBox(joint_deg=0.3, base_mm=1.0))
-    found = verify_robot(cell, read_path(file, cell.robot))
+    found = verify_robot(cell, read_rows(file, cell.robot))
     assert found.verdict is Verdict.CERTIFIED
     proof, problem = tmp_path / "c", tmp_path / "cell.yaml"
 
@@ -174,9 +175,9 @@ def test_a_counterexample_beside_what_moves_is_told_in_rows(tmp_path: Path) -> N
     moves, knots = np.array([0.5, 1.7]), np.array([[0.0, 1.5, 0.0], [0.5, 1.1, 0.0]])
     near = cell_with(tmp_path, moves, knots)
     motion = Motion(rows, times=times)
-    least = verify_robot(near, motion).least
+    least = verify_robot(near, named(motion)).least
     asked = replace(near, required_clearance=float(least.lower.min()) - 0.01)
-    result = verify_robot(asked.under(TypedErrorBox(joint_deg=3.0)), motion)
+    result = verify_robot(asked.under(TypedErrorBox(joint_deg=3.0)), named(motion))
     (lost,) = result.counterexamples
     assert result.verdict is Verdict.REFUTED
     assert result.nominal_clear
@@ -195,7 +196,7 @@ def test_what_is_not_done_beside_what_moves_is_said(tmp_path: Path) -> None:
     joints = tuple(joint.name for joint in cell.robot.joints)
     rows = np.array([[0.0, 0.0], [1.0, 0.0]])
     with pytest.raises(InvalidInput, match="no column 'time_s', but obstacle 'ball'"):
-        verify_robot(cell, Motion(rows))
+        verify_robot(cell, named(Motion(rows)))
     with pytest.raises(InvalidInput, match="no column 'time_s', but obstacle 'ball'"):
         repair_robot(cell, JointTrajectory(joints, rows))
 
@@ -210,9 +211,9 @@ def test_a_motion_beside_what_moves_is_repaired_in_its_time(tmp_path: Path) -> N
     cell = cell_with(tmp_path, moves, knots)
     joints = tuple(joint.name for joint in cell.robot.joints)
     motion = JointTrajectory(joints, rows, times)
-    assert verify_robot(cell, motion.path).verdict is Verdict.REFUTED
+    assert verify_robot(cell, motion).verdict is Verdict.REFUTED
     found = repair_robot(cell, motion)
-    path = found.verification.trajectory
+    path = found.verification.trajectory.path
     assert found.verification.verdict is Verdict.CERTIFIED
     assert path.knots[[0, -1]].tolist() == rows.tolist()
     assert path.own_times[[0, -1]].tolist() == times.tolist()

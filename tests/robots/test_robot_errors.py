@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from oracles.certificate_cases import certificate_lines
+from oracles.shortcuts import named
 
 from vdsm_pin.certificate_checker.program import main as check_certificate_main
 from vdsm_pin.cli import main
@@ -182,7 +183,7 @@ def distance(one: tuple, other: tuple) -> float:
 def test_no_sample_of_the_box_is_nearer_than_proved(robot: Robot, seed: int) -> None:
     rng = np.random.default_rng(seed)
     cell, path = random_cell(robot, rng)
-    sampler, found = Sampler(cell), verify_robot(cell, path)
+    sampler, found = Sampler(cell), verify_robot(cell, named(path))
     least: dict[tuple[str, str], float] = {}
     for k in range(300):
         moment = rng.uniform(0.0, 2.0)
@@ -202,7 +203,7 @@ def test_each_error_alone_is_covered(robot: Robot) -> None:
     path = Motion(np.zeros((1, 2)))
 
     def lower(**errors: float) -> float:
-        found = verify_robot(Cell(robot, scene, errors=ErrorBox(**errors)), path)
+        found = verify_robot(Cell(robot, scene, errors=ErrorBox(**errors)), named(path))
         k = [pair.own for pair in found.pairs].index("base")
         return float(found.least.lower[k])
 
@@ -219,12 +220,12 @@ def test_just_beyond_what_is_proved_is_refuted(robot: Robot, seed: int) -> None:
     cell, path = random_cell(robot, np.random.default_rng(seed))
     errors = TypedErrorBox(joint_deg=1.5, slide_mm=6.0, base_mm=4.0)
     cell, size = replace(cell, errors=errors), [np.radians(1.5), 0.006]
-    proved = verify_robot(cell, path).least
+    proved = verify_robot(cell, named(path)).least
     asked = max(0.0, float(proved.lower[:12].min())) + 0.008
-    found = verify_robot(replace(cell, required_clearance=asked), path)
+    found = verify_robot(replace(cell, required_clearance=asked), named(path))
     assert found.verdict is Verdict.REFUTED
     if not found.counterexamples:  # the nominal motion itself is too near
-        exact = verify_robot(replace(cell, errors=ErrorBox()), path).least
+        exact = verify_robot(replace(cell, errors=ErrorBox()), named(path)).least
         assert exact.upper[:12].min() < asked
         return
     (one,) = found.counterexamples

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.shortcuts import named
 
 from tests.robots.test_moving_beside_robots import along, cell_with, gaps
 from tests.robots.test_robots import write
@@ -42,7 +43,7 @@ def slid(
     write(folder, "slider.urdf", SLIDER)
     cell = read_cell(write(folder, "cell.yaml", scene.format(required=required)))
     times = start + np.arange(float(len(x)))
-    result = verify_robot(cell, Motion(np.array(x)[:, None], times=times))
+    result = verify_robot(cell, named(Motion(np.array(x)[:, None], times=times)))
     assert not result.not_done
     return next(row for row in result.checks if "obstacles" in row.name)
 
@@ -135,7 +136,7 @@ def test_contacts_beside_what_moves_are_those_of_dense_samples(
     elbow = rows[1:3, 0].mean()  # at 1.25 s the ball is there
     knots[1] = [0.5 * np.cos(elbow), 0.5 * np.sin(elbow), 0.0]
     cell = cell_with(tmp_path, moves, knots)
-    result = verify_robot(cell, Motion(rows, times=times))
+    result = verify_robot(cell, named(Motion(rows, times=times)))
     row = next(one for one in result.checks if "obstacles" in one.name)
     moments = np.linspace(0.0, 3.0, 60_001)
     at = np.interp(moments, np.arange(4.0), times)

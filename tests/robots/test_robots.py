@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.shortcuts import read_path, read_scene
+from oracles.shortcuts import named, read_path, read_scene
 
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
@@ -23,6 +23,7 @@ from vdsm_pin.robots.cell import Cell, cell_of, read_cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import NEAR, verify_robot
 from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.trajectory_files import read_motion
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
@@ -91,7 +92,7 @@ def test_the_least_clearance_is_the_closed_form(tmp_path: Path, robot: Robot) ->
     # The arm's ball runs on a circle of 1 m, the other stands 1.3 m away: 150 mm left.
     scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
     path = read_path(write(tmp_path, "t.csv", ROWS), robot)
-    found = verify_robot(Cell(robot, scene, 0.149), path)
+    found = verify_robot(Cell(robot, scene, 0.149), named(path))
     assert found.verdict is Verdict.CERTIFIED, found.checks
     near = found.approaches[0]
     assert (near.pair.own, near.pair.label) == ("arm", "ball")
@@ -99,7 +100,7 @@ def test_the_least_clearance_is_the_closed_form(tmp_path: Path, robot: Robot) ->
     assert near.upper - near.lower < 0.02 * 0.15
     assert near.moment == pytest.approx(np.pi / 6.0, abs=0.05)
     assert near.coal == pytest.approx(near.upper, abs=5e-6)
-    lost = verify_robot(Cell(robot, scene, 0.151), path)
+    lost = verify_robot(Cell(robot, scene, 0.151), named(path))
     assert lost.verdict is Verdict.REFUTED
     np.testing.assert_allclose(
         np.linalg.norm(near.link_point - near.other_point), near.upper, atol=1e-6
@@ -120,7 +121,9 @@ def test_what_grazes_for_a_moment_is_decided(
     centre = np.array([reach - depth + half[0], 0.1, 0.05])
     wall = Box("wall", centre, np.eye(3), half)
     bar = read_robot(RobotFiles(write(tmp_path, "bar.urdf", text)))
-    found = verify_robot(Cell(bar, Scene((wall,))), Motion(np.array(ends)[:, None]))
+    found = verify_robot(
+        Cell(bar, Scene((wall,))), named(Motion(np.array(ends)[:, None]))
+    )
     (row,) = (one for one in found.checks if one.name == CheckKind.OBSTACLES)
     assert row.verdict is (Verdict.REFUTED if depth > 0.0 else Verdict.CERTIFIED)
     assert -depth / 2.0 <= row.worst < 0.0 if depth > 0.0 else row.worst <= -depth
@@ -130,7 +133,7 @@ def test_what_is_not_judged_in_time_is_undecided(tmp_path: Path, robot: Robot) -
     """Also where no pair was looked at, so that Coal has nothing to measure."""
     scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
     path = read_path(write(tmp_path, "t.csv", ROWS), robot)
-    found = verify_robot(Cell(robot, scene), path, Deadline.after(0.0))
+    found = verify_robot(Cell(robot, scene), named(path), Deadline.after(0.0))
     assert found.verdict is Verdict.UNDECIDED
 
 
@@ -142,7 +145,7 @@ def test_without_a_pair_to_check_nothing_is_green(tmp_path: Path) -> None:
     srdf = write(tmp_path, "r.srdf", f'<robot name="two">{ignored}</robot>')
     urdf = write(tmp_path, "two.urdf", URDF)
     cell = cell_of(RobotFiles(urdf=urdf, srdf=srdf))
-    rows = verify_robot(cell, Motion(np.array([[0.0, 0.0], [1.0, 0.0]])))
+    rows = verify_robot(cell, named(Motion(np.array([[0.0, 0.0], [1.0, 0.0]]))))
     assert rows.verdict is Verdict.UNDECIDED
     bad = [row for row in rows.checks if row.verdict is not Verdict.CERTIFIED]
     assert [(row.name, row.count) for row in bad] == [("clearance between links", 0)]
@@ -164,7 +167,7 @@ def test_far_pairs_are_held_against_balls_by_coal(
 
     monkeypatch.setattr(CoalShapes, "between_balls", moved)
     cell, path = Cell(robot, Scene(tuple(balls))), Motion(np.array([[0.0, 0.0]]))
-    found = verify_robot(cell, path)
+    found = verify_robot(cell, named(path))
     (row,) = [check for check in found.checks if "Coal" in check.name]
     near = (found.least.lower < NEAR).sum()
     assert row.count == max(near, len(found.approaches)) < len(found.pairs)
@@ -182,7 +185,7 @@ def test_a_shape_that_coal_cannot_take_is_named(tmp_path: Path) -> None:
     text = URDF.replace('<cylinder radius="0.05" length="0.2"/>', mesh)
     urdf = RobotFiles(write(tmp_path, "two.urdf", text))
     cell = cell_of(urdf, write(tmp_path, "s.yaml", SCENE))
-    found = verify_robot(cell, Motion(np.array([[0.0, 0.0], [1.0, 0.1]])))
+    found = verify_robot(cell, named(Motion(np.array([[0.0, 0.0], [1.0, 0.1]]))))
     (row,) = [check for check in found.checks if "Coal" in check.name]
     assert row.verdict is Verdict.CERTIFIED
     assert row.where.endswith("; none of 'hand', whose shape Coal cannot take")
@@ -198,7 +201,7 @@ def test_a_robot_of_which_nothing_moves_is_judged_where_it_stands(
     path = read_path(write(tmp_path, "t.csv", "time_s\n0\n1\n"), robot)
     scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
     for required, verdict in ((0.149, "certified"), (0.151, "refuted")):
-        found = verify_robot(Cell(robot, scene, required), path)
+        found = verify_robot(Cell(robot, scene, required), named(path))
         assert found.verdict.value == verdict
         assert found.min_clearance == pytest.approx(0.15, abs=1e-9)
 
@@ -210,7 +213,7 @@ def test_the_profile_is_the_least_of_each_link_and_obstacle(
     scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
     turns = np.linspace(0.0, 3.0, 40)
     path = Motion(np.column_stack([turns, np.zeros(40)]))
-    profile = verify_robot(Cell(robot, scene), path).profile
+    profile = verify_robot(Cell(robot, scene), named(path)).profile
     fine = np.linspace(turns[:-1], turns[1:], 50)
     gap = np.hypot(np.cos(fine), np.sin(fine) - 1.3) - 0.15
     k = [body.name for body in robot.bodies].index("arm")
@@ -234,7 +237,7 @@ def test_what_meets_is_refuted_though_nothing_is_required(
             tmp_path, "s.yaml", text.replace("X", str(x)) + "size: [0.2, 1, 0.05]}"
         )
         rows = read_path(write(tmp_path, "t.csv", ROWS), robot)
-        found = verify_robot(Cell(robot, read_scene(scene, 1.0)), rows)
+        found = verify_robot(Cell(robot, read_scene(scene, 1.0)), named(rows))
         k = [str(pair) for pair in found.pairs].index("base and crate")
         assert found.least.verdict[k] == (verdict is Verdict.REFUTED)
 
@@ -246,7 +249,7 @@ def test_of_bodies_that_meet_the_depth_is_told_as_the_least(
     text = f"length_unit: m\nobstacles: [{crate}]\n"
     scene = read_scene(write(tmp_path, "s.yaml", text), 1.0)
     rows = read_path(write(tmp_path, "t.csv", ROWS), robot)
-    found = verify_robot(Cell(robot, scene, required_clearance=0.01), rows)
+    found = verify_robot(Cell(robot, scene, required_clearance=0.01), named(rows))
     (row,) = (one for one in found.checks if one.name == "clearance from obstacles")
     assert row.verdict is Verdict.REFUTED
     assert row.deeper
@@ -255,11 +258,11 @@ def test_of_bodies_that_meet_the_depth_is_told_as_the_least(
     assert (near.upper, near.deeper) == (row.worst, True)
     # The arm's ball of 100 mm comes 80 mm deep into a wall; what both hold is smaller.
     wall = HalfSpace("wall", np.array([0.0, 1.02, 0.0]), np.array([0.0, -1.0, 0.0]))
-    deep = verify_robot(Cell(robot, Scene((wall,))), rows)
+    deep = verify_robot(Cell(robot, Scene((wall,))), named(rows))
     near = next(one for one in deep.approaches if str(one.pair) == "arm and wall")
     assert -0.08 - 1e-9 <= near.upper <= 0.9 * -0.08
     ball = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
-    apart = verify_robot(Cell(robot, ball, required_clearance=0.151), rows)
+    apart = verify_robot(Cell(robot, ball, required_clearance=0.151), named(rows))
     assert apart.verdict is Verdict.REFUTED
     assert not any(one.deeper for one in (*apart.checks, *apart.approaches))
 
@@ -296,11 +299,11 @@ def test_limits_are_checked_at_and_between_waypoints(
     past = read_path(
         write(tmp_path, "t.csv", "turn_deg,slide_mm\n0,0\n90,401\n"), robot
     )
-    found = verify_robot(Cell(robot, scene), past)
+    found = verify_robot(Cell(robot, scene), named(past))
     refuted = [c.name for c in found.checks if c.verdict is Verdict.REFUTED]
     assert refuted == ["joint 'slide' in its limits"]
     still = read_path(write(tmp_path, "r.csv", "turn_deg,slide_mm\n0,0\n"), robot)
-    turn = verify_robot(Cell(robot, scene), still).checks[1]
+    turn = verify_robot(Cell(robot, scene), named(still)).checks[1]
     assert turn.limit == robot.joints[0].upper == -robot.joints[0].lower
     # From 0.39 back to it at a speed of v the slide goes v / 4 farther, the control
     # points v / 3; its limit is 0.4.
@@ -311,9 +314,10 @@ def test_limits_are_checked_at_and_between_waypoints(
             for q, v, t in ends
         ]
         message = {"joint_names": ["slide", "turn"], "points": points}
-        smooth = read_path(write(tmp_path, "t.json", json.dumps(message)), robot)
-        assert smooth.degree == 3
-        assert smooth.knots.tolist() == [[0.0, 0.39], [1.0, 0.39]]
+        file = write(tmp_path, "t.json", json.dumps(message))
+        smooth = read_motion(file, robot.joints, None, robot.values)
+        assert smooth.path.degree == 3
+        assert smooth.q.tolist() == [[0.0, 0.39], [1.0, 0.39]]
         checks = verify_robot(Cell(robot, scene), smooth).checks
         (limit,) = (c for c in checks if c.name == "joint 'slide' in its limits")
         assert limit.verdict.value == verdict
@@ -347,7 +351,7 @@ def test_a_joint_is_held_to_the_limits_of_what_mimics_it(
     rows = "turn_rad,slide_m,time_s\n0,0.1,0\n0.2,0.3,1\n"
     path = read_path(write(tmp_path, "t.csv", rows), robot)
     scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
-    checks = verify_robot(Cell(robot, scene), path).checks
+    checks = verify_robot(Cell(robot, scene), named(path)).checks
     (row,) = (c for c in checks if c.name == "joint 'slide' in its limits")
     assert row.verdict.value == verdict
     assert whose in row.where

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracles.certificate_cases import write_cube
 from oracles.random_robots import MESH, random_urdf
-from oracles.shortcuts import read_path
+from oracles.shortcuts import read_rows
 
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
@@ -88,7 +88,7 @@ def test_closed_form_and_swapped_roles(seed: int, tmp_path: Path) -> None:
     q = {name: rng.uniform(-2.5, 2.5, 3) for name in BASES}
     for own, name in (("left", "right: ball"), ("right", "left: ball")):
         cell, file = two(tmp_path, q, own)
-        found = verify_robot(cell, read_path(file, cell.robot))
+        found = verify_robot(cell, read_rows(file, cell.robot))
         start, end = TIMES[own][0], TIMES[own][-1]
         least = float(truth(q, np.linspace(start, end, 60_001)).min())
         (near,) = found.approaches
@@ -116,7 +116,7 @@ def test_another_robot_may_stand_still(tmp_path: Path) -> None:
     cell = read_cell(
         write(tmp_path, "left.yaml", text.replace("{urdf: right.urdf}", locked))
     )
-    found = verify_robot(cell, read_path(file, cell.robot))
+    found = verify_robot(cell, read_rows(file, cell.robot))
     least = truth(q, np.linspace(0.0, 3.0, 9_001)).min()
     assert found.approaches[0].lower <= least <= found.approaches[0].upper + 1e-9
     assert "right: ball" in report_data(found).text
@@ -135,7 +135,7 @@ def test_another_robot_is_held_to_its_limits(
     text = urdf(RADIUS["right"]).replace('velocity="99"', f'velocity="{velocity}"')
     write(tmp_path, "right.urdf", text)
     cell = read_cell(tmp_path / "left.yaml")
-    checks = verify_robot(cell, read_path(file, cell.robot)).checks
+    checks = verify_robot(cell, read_rows(file, cell.robot)).checks
     rows = {one.name: one for one in checks if one.name.startswith("right: joint")}
     assert len(rows) == 2
     failed = [row for row in rows.values() if row.verdict is Verdict.REFUTED]
@@ -156,7 +156,7 @@ def test_swapped_roles_agree_to_the_padding(tmp_path: Path) -> None:
         patch.setitem(TIMES, "right", whole["right"])
         for own in BASES:
             cell, file = two(tmp_path, q, own)
-            found.append(verify_robot(cell, read_path(file, cell.robot)))
+            found.append(verify_robot(cell, read_rows(file, cell.robot)))
     one, other = found
     assert "1 other robot of" in scene_words(one.problem.scene)
     assert one.verdict is other.verdict
@@ -167,7 +167,8 @@ def test_certificate_is_of_both_trajectories(tmp_path: Path) -> None:
     """Planes of one motion are no proof beside another one of the second robot."""
     q = {"left": np.array([1.2, 0.3, 1.2]), "right": np.array([1.0, 0.9, 1.1])}
     cell, file = two(tmp_path, q)
-    found, proof = verify_robot(cell, read_path(file, cell.robot)), tmp_path / "proof"
+    found = verify_robot(cell, read_rows(file, cell.robot))
+    proof = tmp_path / "proof"
     assert found.verdict is Verdict.CERTIFIED
 
     def outcome(*, told: bool = True) -> Outcome:
@@ -198,7 +199,7 @@ def test_another_robot_moves_by_a_topic_of_a_bag(tmp_path: Path) -> None:
     types = pytest.importorskip("rosbags.typesys")
     q = {"left": np.array([1.2, 0.3, 1.2]), "right": np.array([1.0, 0.9, 1.1])}
     cell, file = two(tmp_path, q)
-    by_rows = verify_robot(cell, read_path(file, cell.robot))
+    by_rows = verify_robot(cell, read_rows(file, cell.robot))
     store = types.get_typestore(types.Stores.ROS2_HUMBLE)
     with rosbag2.Writer(tmp_path / "right", version=9) as writer:
         for topic, turned in (("/far", 0.9), ("/plan", 0.0)):
@@ -217,7 +218,7 @@ def test_another_robot_moves_by_a_topic_of_a_bag(tmp_path: Path) -> None:
         )
     chosen = text.replace("right.csv}", "right, topic: /plan}")
     cell = read_cell(write(tmp_path, "left.yaml", chosen))
-    found = verify_robot(cell, read_path(file, cell.robot))
+    found = verify_robot(cell, read_rows(file, cell.robot))
     np.testing.assert_array_equal(found.least.lower, by_rows.least.lower)
     assert cell.source is not None
     assert {one.name for one in cell.source.files} >= {"metadata.yaml", "right.db3"}
@@ -266,7 +267,7 @@ def test_random_pairs_keep_what_dense_samples_by_coal_say(
     )
     problem, file = write(tmp_path, "cell.yaml", text), tmp_path / "a.csv"
     cell = read_cell(problem)
-    found = verify_robot(cell, read_path(file, cell.robot))
+    found = verify_robot(cell, read_rows(file, cell.robot))
     other = np.eye(4)
     other[:3, :3], other[:3, 3] = rotation_from_rpy(np.array([0, 0, np.pi / 2])), place
     at = np.linspace(0.0, 2.0, 400)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -74,16 +74,16 @@ class RobotSubject:
         joint_error: bool = False,
     ) -> RobotVerification:
         """Verify a motion; `all_pairs` and `joint_error` are of arms."""
-        found = verify_robot(self.problem, motion.path, self.options.deadline)
+        found = verify_robot(self.problem, motion, self.options.deadline)
         if table is not None:
             n_pairs = len(found.pairs)
             with closing(ClearanceCsv(table, self.problem, n_pairs)) as clearance:
                 clearance.write(found)
-        return replace(found, motion=motion)
+        return found
 
     def is_of(self, verification: RobotVerification, motion: JointTrajectory) -> bool:
         """Whether a verification judged this motion, equal to the last bit."""
-        return motion.path.same_as(verification.trajectory)
+        return motion.path.same_as(verification.trajectory.path)
 
     def certify(
         self, path: Path, verification: RobotVerification, hashes: "Hashes"

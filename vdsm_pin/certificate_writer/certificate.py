@@ -102,7 +102,7 @@ def _of_robot(
     from vdsm_pin.robots.cell import joint_errors
     from vdsm_pin.robots.files import HULLS
 
-    cell, path = verification.problem, verification.trajectory
+    cell, path = verification.problem, verification.trajectory.path
     robot, whole = cell.robot, joined_path(path, cell.scene)
     motion = AskedMotion(cell.asked, *whole, verification.errors)
     known = {} if robot.solids == HULLS else robot.covers

@@ -108,6 +108,15 @@ class JointTrajectory(Summarised, ByValue):
 
         return Path.through(self.q, self.times, self.rates, self.changes)
 
+    @property
+    def n_samples(self) -> int:
+        """Number of waypoints."""
+        return len(self.q)
+
+    def times_at(self, moments: FloatArray) -> FloatArray | None:
+        """Times of moments in waypoints, shape (m,); [s]. None where not known."""
+        return self.path.times_at(moments)
+
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Its joints, its size and its time."""
         times = self.times

@@ -119,10 +119,7 @@ def repair_robot(
     moments = np.arange(float(len(motion.q)))
     return repaired(
         _Motion(cell, motion, motion, moments, origins),
-        lambda found: replace(
-            verify_robot(cell, found.rows.path, deadline, contacts=False),
-            motion=found.rows,
-        ),
+        lambda found: verify_robot(cell, found.rows, deadline, contacts=False),
         MARGINS,
         deadline,
         under_errors=cell.errors != ErrorBox(),

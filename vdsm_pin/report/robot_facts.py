@@ -21,21 +21,21 @@ from vdsm_pin.verification.inside import mesh_notes
 
 def robot_facts(verification: RobotVerification) -> dict[str, Any]:
     """The fields of verification.json that are a robot's own."""
-    cell, path = verification.problem, verification.trajectory
+    cell, motion = verification.problem, verification.trajectory
     return {
         "notes": (
             *cell.robot.notes,
             *file_notes(cell),
             *mesh_notes(cell),
-            *longer_motions(cell, path.times),
-            *(f"trajectory: {note}" for note in _said(verification)),
+            *longer_motions(cell, motion.times),
+            *(f"trajectory: {note}" for note in motion.notes),
         ),
         "coverage": None,
         "path_length_m": None,
         "undrawn_m": (),
         "error_box": error_box(cell.errors),
         "left_out": left_out_rows(cell.robot.left_out),
-        "motion": _motion(cell, path),
+        "motion": _motion(cell, motion.path),
         "counterexamples": tuple(
             counterexample_row(
                 verification, one, joints=_erring(cell.robot, one.joints, one.offsets)
@@ -43,11 +43,6 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
             for one in verification.counterexamples
         ),
     }
-
-
-def _said(verification: RobotVerification) -> tuple[str, ...]:
-    """What the reader of the trajectory has to say."""
-    return () if verification.motion is None else verification.motion.notes
 
 
 def _motion(cell: Cell, path: Path) -> RobotFacts:

@@ -10,7 +10,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.paths import Path
 from vdsm_pin.robots.by_itself import checks_by_itself
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -39,30 +38,33 @@ class RobotVerification(Verification):
     Args:
         problem: The robot, its obstacles, the clearances asked for.
         trajectory: What was judged.
-        motion: The waypoints it was made of; None where a path alone was given.
     """
 
     problem: Cell
-    trajectory: Path
-    motion: JointTrajectory | None = None
+    trajectory: JointTrajectory
 
 
 def verify_robot(
-    cell: Cell, path: Path, deadline: Deadline = NO_LIMIT, *, contacts: bool = True
+    cell: Cell,
+    trajectory: JointTrajectory,
+    deadline: Deadline = NO_LIMIT,
+    *,
+    contacts: bool = True,
 ) -> RobotVerification:
     """The judgement of a motion; what is not judged in time is undecided.
 
     Args:
         cell: The robot, its obstacles, the clearances asked for.
-        path: The motion.
+        trajectory: Its columns are of the joints that move, in their order.
         deadline: When to give up what is left.
         contacts: Whether to look for when bodies first and last come too close.
     """
+    path = trajectory.path
     motion = AskedMotion.of_robot(cell.asked, path, cell.errors)
     far = NEAR + max(cell.required_clearance, cell.required_self_clearance)
     budget, extras = Budget(until=deadline.end, slack=WIDTH, far=far), BestEffort()
     proof, places = prove_motion(motion, budget), located(motion, deadline)
-    asked = cell, path, proof.with_depths(deadline), places, extras, deadline
+    asked = cell, trajectory, proof.with_depths(deadline), places, extras, deadline
     found = judge_clearance(*asked, contacts=contacts)
     nearest = found.nearest
     coal, measured = _coal(cell, proof, [*nearest])
@@ -74,7 +76,7 @@ def verify_robot(
     ]
     return RobotVerification(
         problem=cell,
-        trajectory=path,
+        trajectory=trajectory,
         pairs=proof.pairs,
         checks=tuple(checks),
         approaches=tuple(
