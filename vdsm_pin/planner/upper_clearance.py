@@ -19,6 +19,7 @@ from vdsm_pin.geometry.obstacles import (
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.held import drawn_out
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import clearance_words
 
@@ -130,7 +131,9 @@ def nearest_bounds(
     return result, which
 
 
-def upper_distances(problem: PlanningProblem, segments: FloatArray) -> FloatArray:
+def upper_distances(
+    problem: PlanningProblem, segments: FloatArray, deadline: Deadline = NO_LIMIT
+) -> FloatArray:
     """Upper bounds of the distance of segments to each obstacle.
 
     Each rests on two points, one of the segment and one of the obstacle's surface.
@@ -138,14 +141,20 @@ def upper_distances(problem: PlanningProblem, segments: FloatArray) -> FloatArra
     Args:
         problem: The scene.
         segments: Shape (n, 2, 3); [m].
+        deadline: When to give up.
 
     Returns:
         Shape (n, n_obstacles); [m].
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     if not problem.scene.obstacles:
         return np.full((len(segments), 0), np.inf)
-    pieces = problem.packed_obstacles
-    return np.asarray(upper_bounds(pieces, np.ascontiguousarray(segments), np.inf))
+    pieces, ends = problem.packed_obstacles, np.ascontiguousarray(segments)
+    found = upper_bounds(pieces, ends, deadline.end)
+    deadline.check()
+    return np.asarray(found)
 
 
 def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArray:

@@ -38,11 +38,12 @@ from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.progress import shown
-from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance
 
 HALF = 0.08
+OVER = Deadline(1.0, 0.0)
 
 
 def wall(x: float, half: float) -> list[Obstacle]:
@@ -94,11 +95,11 @@ def test_what_the_path_itself_lacks_is_named() -> None:
     task = behind(HALF)
     tips = np.array([[0.5, 0.0, 0.01], [0.7, 0.0, 0.01]])
     room = 0.07 - task.manipulator.most_radius
-    told = on_the_path(task, tips, room + 1e-4)
+    told = on_the_path(task, link_clearance(task), tips, room + 1e-4)
     assert told is not None
     assert f"leaves the tip itself {room * 1e3:.3f} mm to 'wall3'" in told.words
     assert (told.link, told.obstacle) == (8, "wall3")
-    assert on_the_path(task, tips, room - 1e-4) is None
+    assert on_the_path(task, link_clearance(task), tips, room - 1e-4) is None
     assert at_reach(task, tips) is None
     short = replace(task.manipulator, base_range=(-5.0, 0.7 - 3.126))
     told = at_reach(replace(task, manipulator=short), tips)
@@ -116,7 +117,8 @@ def test_a_stop_is_told_with_the_station_where_it_was() -> None:
     corners = Corners(np.zeros((0, 3)), still, np.zeros(0), proof.far[:0])
     found = Found(route, corners, (len(route.layers) - 1,))
     judge = Judge(task, clearance, 0.0, 0.0, 1e-3)
-    told = how_far(task, Explored(judge, found, rows, proof), Deadline(1.0, 0.0))
+    late = replace(clearance, deadline=OVER)
+    told = how_far(task, Explored(judge, found, rows, proof), late)
     assert told.station == route.stations[-2] > 0.0
     at = in_mm(told.station)
     assert told.words.startswith(
@@ -140,13 +142,13 @@ def test_the_narrowest_passage_is_measured_though_the_body_does_not_pass(
     task = behind(half)
     clearance = broad_phase(task, link_clearance(task))
     tip = task.path.points[0]
-    passed = narrowest_passage(task, clearance, tip, NO_LIMIT)
+    passed = narrowest_passage(task, clearance, tip)
     assert passed is not None
     place = passed.place
     room = link_clearance(task)(np.repeat(place[None, None], 2, axis=1))[0, 0]
     assert room == pytest.approx(half - task.manipulator.most_radius, abs=2e-5)
     assert too_narrow(task, place)
-    assert narrowest_passage(task, clearance, tip, Deadline(1.0, 0.0)) is None
+    assert narrowest_passage(task, replace(clearance, deadline=OVER), tip) is None
 
 
 def test_what_keeps_an_arm_from_following_its_tip_is_named() -> None:

@@ -90,7 +90,7 @@ def refuse(problem: PlanningProblem, outcome: Explored) -> None:
     allowed = TOLERANCES.coverage * problem.path.length
     whole = problem.path.blocked is Blocked.FAIL
     if outcome.found is None or (whole and missing > allowed):
-        reached = how_far(problem, outcome, deadline_of(outcome.judge.clearance))
+        reached = how_far(problem, outcome, outcome.judge.clearance)
         raise NoPlanFound(str(reached), reached)
 
 
@@ -113,10 +113,8 @@ def _proved(problem: PlanningProblem, outcome: Explored) -> Infeasible:
         return HemmedIn(station=_station(problem, rows.stations[first]))
     if not proof.buried.any():
         first = int(np.flatnonzero(proof.cut_off)[0])
-        clearance = outcome.judge.clearance
-        passed = narrowest_passage(
-            problem, clearance, rows.tips[first], deadline_of(clearance)
-        )
+        tip, clearance = rows.tips[first], outcome.judge.clearance
+        passed = narrowest_passage(problem, clearance, tip)
         words = "" if passed is None else passage(problem, passed.place)
         return CutOff(station=_station(problem, rows.stations[first]), narrowest=words)
     first = int(np.flatnonzero(proof.buried)[0])
@@ -171,13 +169,15 @@ def say_drawn(problem: PlanningProblem, outcome: Explored) -> None:
     )  # fmt: skip
 
 
-def how_far(problem: PlanningProblem, outcome: Explored, deadline: Deadline) -> Reached:
+def how_far(
+    problem: PlanningProblem, outcome: Explored, clearance: LinkClearance
+) -> Reached:
     """Where the search came to an end, what stopped it, what to try; not a proof.
 
     Args:
         problem: What was asked.
         outcome: What the search came to.
-        deadline: Until when the narrowest passage may be looked for.
+        clearance: The planner's own, as long as the cause may be looked for.
     """
     drawn = _drawn(problem, outcome)
     route = None if outcome.found is None else outcome.found.route
@@ -197,19 +197,35 @@ def how_far(problem: PlanningProblem, outcome: Explored, deadline: Deadline) -> 
         f"{problem.in_file(tip)}"
     )
     rows = outcome.rows.tips[(stations >= station) & (stations <= stop)]
-    cause = on_the_path(problem, rows, outcome.judge.required)
-    if cause is None and outcome.stuck is not None:
-        cause = where_stuck(problem, outcome.stuck)
-    cause = cause or at_reach(problem, rows)
+    cause = _seen(problem, outcome, clearance, rows) or at_reach(problem, rows)
     if cause is None:
-        passed = narrowest_passage(problem, outcome.judge.clearance, tip, deadline)
-        cause = _on_the_way(problem, passed, tip)
+        passed = narrowest_passage(problem, clearance, tip)
+        cause = _on_the_way(problem, passed, tip, deadline_of(clearance))
     told = f"{words}; {cause.words}" if cause.words else words
     return replace(cause, words=told, station=_station(problem, station))
 
 
+def _seen(
+    problem: PlanningProblem,
+    outcome: Explored,
+    clearance: LinkClearance,
+    tips: FloatArray,
+) -> Reached | None:
+    """What is seen on a stretch of the path, (r, 3), or where an arm got stuck."""
+    kept, stuck = outcome.judge.required, outcome.stuck
+    with suppress(OutOfTime):
+        cause = on_the_path(problem, clearance, tips, kept)
+        if cause is None and stuck is not None:
+            cause = where_stuck(problem, stuck, deadline_of(clearance))
+        return cause
+    return None
+
+
 def _on_the_way(
-    problem: PlanningProblem, passed: Passage | None, tip: FloatArray
+    problem: PlanningProblem,
+    passed: Passage | None,
+    tip: FloatArray,
+    deadline: Deadline,
 ) -> Reached:
     """What is in the way to a tip: the passage, the follower, the straight arm.
 
@@ -217,14 +233,17 @@ def _on_the_way(
         problem: Arm and scene.
         passed: The best way in, None where none is known.
         tip: Shape (3,); [m].
+        deadline: Until when to look at the follower.
     """
     advice, parts = "another start or a longer time limit", list[str]()
     if passed is not None:
         if too_narrow(problem, passed.place):
             return no_way_in(problem, passed.place)
-        follower = following(problem, passed.route)
-        parts += [passage(problem, passed.place), follower.words]
-        advice = f"{follower.advice} or {advice}" if follower.advice else advice
+        parts.append(passage(problem, passed.place))
+        with suppress(OutOfTime):
+            follower = following(problem, passed.route, deadline)
+            parts.append(follower.words)
+            advice = f"{follower.advice} or {advice}" if follower.advice else advice
     zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
     centres = standing(problem.manipulator, tip[None], zero)[0]
     if not problem.scene.obstacles or not np.isfinite(centres).all():

@@ -17,7 +17,6 @@ from vdsm_pin.planner.fewest.tip_room import TipRoom
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
 NEARER: Final = 0.6
@@ -50,18 +49,14 @@ class Passage:
 
 
 def narrowest_passage(
-    problem: PlanningProblem,
-    clearance: LinkClearance,
-    tip: FloatArray,
-    deadline: Deadline,
+    problem: PlanningProblem, clearance: LinkClearance, tip: FloatArray
 ) -> Passage | None:
     """The best way in to a tip and the middle of its narrowest opening.
 
     Args:
         problem: Arm and scene.
-        clearance: The planner's own.
+        clearance: The planner's own, as long as to look.
         tip: Where the way ends, shape (3,); [m].
-        deadline: Until when to look.
 
     Returns:
         None without obstacles, where there is no way, or the time is over.
@@ -69,7 +64,7 @@ def narrowest_passage(
     if not problem.scene.obstacles:
         return None
     assert isinstance(clearance, BroadPhase)
-    exact = replace(clearance, floor=-np.inf, deadline=deadline)
+    exact = replace(clearance, floor=-np.inf)
     arm = problem.manipulator
     required = problem.required_clearance - NEARER * arm.most_radius
     step = STEP * arm.total_length

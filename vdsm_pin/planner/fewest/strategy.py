@@ -195,7 +195,7 @@ class _Search:
             refuse(problem, best)
             return self._written(quick, best)
         except OutOfTime as ended:
-            reached = "" if best is None else how_far(problem, best, quick.deadline)
+            reached = "" if best is None else how_far(problem, best, quick)
             raise OutOfTime(ended.limit, reached) from None
 
     def _written(self, clearance: BroadPhase, outcome: Explored) -> Plan:

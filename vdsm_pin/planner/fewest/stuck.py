@@ -14,9 +14,12 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
+from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.start import start_centres
+from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import (
     TIP_ONLY,
+    Culprit,
     culprit,
     held_from,
     named,
@@ -25,6 +28,7 @@ from vdsm_pin.planner.upper_clearance import (
 )
 from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import at_most_mm, in_mm
 
 AT_LIMIT: Final = 0.97
@@ -57,30 +61,43 @@ class Stuck:
     centres: FloatArray
 
 
-def where_stuck(problem: PlanningProblem, stuck: Stuck) -> Reached:
-    """The narrowest passage, how far the arm came, what to try."""
-    parts, link, obstacle = list[str](), 0, ""
-    narrowest: list[float] = []
-    if held_from(problem, TIP_ONLY).scene.obstacles:
-        narrow = stuck.route[_opening(problem, stuck)[0]]
-        parts.append(passage(problem, narrow))
-        narrowest = narrow.tolist()
-    if problem.scene.obstacles:
-        found = culprit(problem, stuck.centres)
-        link, obstacle = found.link, found.obstacle
-    parts.append(_stop(problem, stuck))
-    follower = following(problem, stuck.route)
+def where_stuck(
+    problem: PlanningProblem, stuck: Stuck, deadline: Deadline = NO_LIMIT
+) -> Reached:
+    """The narrowest passage, how far the arm came, what to try.
+
+    Args:
+        problem: Arm and scene.
+        stuck: Where it ended.
+        deadline: When to give up.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    parts, narrowest = list[str](), list[float]()
+    narrow, width = _opening(problem, stuck, deadline)
+    if width < np.inf:
+        parts.append(passage(problem, stuck.route[narrow]))
+        narrowest = stuck.route[narrow].tolist()
+    found = culprit(problem, stuck.centres) if problem.scene.obstacles else None
+    parts.append(_stop(problem, stuck, found))
+    follower = following(problem, stuck.route, deadline)
     parts.append(follower.words)
-    parts.append(f"try {' or '.join(_advice(problem, stuck, follower.advice))}")
+    tight = width <= SNUG * _needed(problem)
+    advice = _advice(problem, stuck, tight, follower.advice)
+    parts.append(f"try {' or '.join(advice)}")
+    link, obstacle = (found.link, found.obstacle) if found else (0, "")
     words, centres = "; ".join(parts), stuck.centres.tolist()
     return Reached(words, 0.0, link, obstacle, centres, narrowest)
 
 
-def _opening(problem: PlanningProblem, stuck: Stuck) -> tuple[int, float]:
+def _opening(
+    problem: PlanningProblem, stuck: Stuck, deadline: Deadline
+) -> tuple[int, float]:
     """Number of the narrowest point of the way, and how wide it is there; [m]."""
     points = np.stack([stuck.route, stuck.route], axis=1)
-    problem = held_from(problem, TIP_ONLY)
-    distances = upper_distances(problem, points).min(axis=1, initial=np.inf)
+    distances = upper_distances(held_from(problem, TIP_ONLY), points, deadline)
+    distances = distances.min(axis=1, initial=np.inf)
     narrow = int(np.argmin(distances))
     return narrow, 2.0 * float(distances[narrow])
 
@@ -98,16 +115,23 @@ class Following:
     advice: str
 
 
-def following(problem: PlanningProblem, route: FloatArray) -> Following:
+def following(
+    problem: PlanningProblem, route: FloatArray, deadline: Deadline = NO_LIMIT
+) -> Following:
     """Where an arm that follows its tip along a way first breaks what is asked.
 
     Args:
         problem: Arm and scene.
         route: Of the tip from its start on, shape (k, 3); [m].
+        deadline: When to give up.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     who = "an arm that follows its tip along it"
     laid = led_along(route, start_centres(problem), problem.manipulator.link_lengths)
     for tip, centres in zip(route, laid, strict=True):
+        deadline.check()
         for words, advice in _broken(problem, centres):
             place = problem.in_file(tip)
             return Following(f"{who} would {words} with the tip at {place}", advice)
@@ -194,25 +218,32 @@ def at_reach(problem: PlanningProblem, tips: FloatArray) -> Reached | None:
 
 
 def on_the_path(
-    problem: PlanningProblem, tips: FloatArray, kept: float
+    problem: PlanningProblem, clearance: LinkClearance, tips: FloatArray, kept: float
 ) -> Reached | None:
     """What keeps every arm from a stretch of the path; None where nothing is seen to.
 
     Args:
         problem: Arm and scene.
+        clearance: Lower bounds, which tell where to measure.
         tips: Along the stretch, at most a row apart, shape (r, 3); [m].
         kept: Clearance that plans keep; [m].
+
+    Raises:
+        OutOfTime: If the time of the clearance function is over.
     """
     problem = held_from(problem, TIP_ONLY)
     arm, share = problem.manipulator, np.arange(FINER)[:, None, None] / FINER
     between = (1.0 - share) * tips[:-1] + share * tips[1:]
     places = np.concatenate([between.reshape(-1, 3), tips[-1:]])
-    distances = upper_distances(problem, np.stack([places, places], axis=1))
+    ends = np.stack([places, places], axis=1)
+    doubtful = clearance(ends, TIP)[:, 0] < kept
+    places, ends = places[doubtful], ends[doubtful]
+    distances = upper_distances(problem, ends, deadline_of(clearance))
     clearances = distances - arm.axis_radii[-1]
     least = clearances.min(axis=1, initial=np.inf)
-    near = int(np.argmin(least))
-    if not least[near] < kept:
+    if not least.min(initial=np.inf) < kept:
         return None
+    near = int(np.argmin(least))
     name = problem.scene.obstacles[int(np.argmin(clearances[near]))].name
     told = (
         f"at {problem.in_file(places[near])} the path leaves the tip itself "
@@ -224,23 +255,31 @@ def on_the_path(
     return Reached(told, 0.0, arm.n_links, name, (), places[near].tolist())
 
 
-def _stop(problem: PlanningProblem, stuck: Stuck) -> str:
+def _stop(problem: PlanningProblem, stuck: Stuck, found: Culprit | None) -> str:
+    """How far the arm came, and what it is nearest to there."""
     gaps = np.linalg.norm(np.diff(stuck.route, axis=0), axis=1)
     whole, come = float(gaps.sum()), float(gaps[: stuck.come - 1].sum())
     words = f"the arm came {in_mm(come)} of {in_mm(whole)} along it"
     if stuck.come == len(stuck.route):
         tip = problem.in_file(stuck.centres[-1])
         words = f"the arm came all the way in and along the path to {tip}"
-    if problem.scene.obstacles:
-        found = culprit(problem, stuck.centres)
-    if problem.scene.obstacles and found.clearance < np.inf:
+    if found and found.clearance < np.inf:
         called = named(problem.manipulator, found.link)
         words += f", where {called} has {found.words} to {found.obstacle!r}"
     return words
 
 
-def _advice(problem: PlanningProblem, stuck: Stuck, follower: str) -> list[str]:
-    """What might help, most likely first; `follower` is what would help a follower."""
+def _advice(
+    problem: PlanningProblem, stuck: Stuck, tight: bool, follower: str
+) -> list[str]:
+    """What might help, most likely first.
+
+    Args:
+        problem: Arm and scene.
+        stuck: Where the arm ended.
+        tight: Whether the way's narrowest opening leaves the body little.
+        follower: What would help an arm that follows its tip.
+    """
     arm, tried = problem.manipulator, []
     base, (low, high) = float(stuck.centres[0, 0]), arm.base_range
     if min(base - low, high - base) <= AT_END * arm.total_length:
@@ -249,10 +288,8 @@ def _advice(problem: PlanningProblem, stuck: Stuck, follower: str) -> list[str]:
     if bends.max() >= AT_LIMIT * arm.max_link_angle:
         joint = int(np.argmax(bends)) + 1
         tried.append(f"larger joint limits, joint {joint} is at its own")
-    if problem.scene.obstacles:
-        _, width = _opening(problem, stuck)
-        if width <= SNUG * _needed(problem):
-            tried.append("a smaller `required_clearance` or a wider opening")
+    if tight:
+        tried.append("a smaller `required_clearance` or a wider opening")
     if follower:
         tried.append(follower)
     return [*tried, "another start", "a longer time limit"]
