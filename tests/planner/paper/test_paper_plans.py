@@ -249,11 +249,15 @@ def test_obs1_goes_back_round_the_base_facing_side() -> None:
     assert retreat.max() == pytest.approx(0.1, rel=1e-6)
 
 
-def test_obs3_changes_only_psi1_and_the_ends_of_one_link() -> None:
-    psi = psi_deg(plan_of("obs3"))
-    changed = np.flatnonzero(psi.max(axis=0) > 0.05) + 1
-    assert changed.tolist() == [1, 4, 5]
-    assert "link 4 is laid past 'column'" in plan_of("obs3").notes[0]
+def test_obs3_changes_psi4_to_psi6_and_never_psi4_with_psi6() -> None:
+    """6.2.2 (5): the link beside the column is laid past it, 5, then 4, then 5."""
+    changed = psi_deg(plan_of("obs3")) > 1e-4
+    assert (np.flatnonzero(changed.any(axis=0)) + 1).tolist() == [1, 4, 5, 6]
+    assert not (changed[:, 3] & changed[:, 5]).any()
+    bent = changed[:, [3, 5]][changed[:, 3] | changed[:, 5]].argmin(axis=1)
+    turns = np.flatnonzero(np.diff(bent))
+    assert bent[[0, *(turns + 1)]].tolist() == [0, 1, 0]
+    assert "link 4 or 5, the one beside 'column'" in plan_of("obs3").notes[0]
 
 
 def test_obs3_is_drawn_whole_without_leaving_the_path() -> None:
@@ -263,10 +267,10 @@ def test_obs3_is_drawn_whole_without_leaving_the_path() -> None:
     assert rows.path_m[rows.on_path].max() == pytest.approx(6.0)
 
 
-def test_obs3_changes_six_rotations_within_35_degrees() -> None:
-    """Section 7: what the experiment turned, and how far."""
+def test_obs3_leaves_eight_rotations_at_zero_and_all_within_35_degrees() -> None:
+    """Section 7 prints 6 at zero; with psi_1 and psi_4 to psi_6 (6.2.2) it is 8."""
     turns = np.rad2deg(np.abs(plan_of("obs3").trajectory.joints[:, 1:]).max(axis=0))
-    assert (turns > 0.05).sum() == 6
+    assert (turns < 1e-4).sum() == 8
     assert turns.max() < 35.0
 
 

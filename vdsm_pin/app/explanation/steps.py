@@ -196,24 +196,22 @@ def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Ste
     arm, seen = moment.plan.problem.manipulator, list(view)
     made = pictures.canvas(moment, view, [rule.region])
     pictures.chain(made, arm, moment.centres[:, seen], "O")
-    first = rule.bends[0] - 1
-    move = moment.planar[first] - moment.reference[first]
-    joints = f"Joint {rule.bends[0]} moves"
-    if len(rule.bends) > 1:
-        joints = f"Joints {rule.bends[0]} and {rule.bends[1]} move"
+    letter = "yz"[rule.axis]
+    moves = (moment.planar - moment.reference)[:, rule.axis]
+    joints = ", ".join(
+        f"joint {bend} by {mm(float(moves[bend - 1]))} mm" for bend in rule.bends
+    )
     rows = [
         (name("P", i + 1), at(moment.reference[i]), at(moment.planar[i]))
         for i in range(arm.n_links + 1)
     ]
-    letter = "yz"[rule.axis]
     return Step(
         title,
         source,
         (
-            f"The obstacle lies across the rail. {joints} by "
-            f"{mm(float(move[rule.axis]))} mm in {letter}, as little as keeps the "
-            "links out of the danger region; the joints before it follow in "
-            "proportion to P₁, those after it in proportion to the tip.",
+            f"The obstacle lies across the rail. Moved along {letter}: {joints}; as "
+            "little as keeps the links out of the danger region. The joints before "
+            "follow in proportion to P₁, those after in proportion to the tip.",
         ),
         (table(("", "reference", "Pᵢ"), rows),),
         (made.svg("the bent arm and the danger region"),),

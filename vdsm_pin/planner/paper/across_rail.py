@@ -4,9 +4,13 @@ Seen along the obstacle (from the top for Z, from the front for Y), the arm pass
 section on one side. Where the straight arm would meet it, one joint moves along the
 auxiliary line, or the two ends of one link, which so is laid past the obstacle; the
 rest follow in proportion between O_1, these joints and the tip (paper, 6.1: "adjusted
-in proportion between the first boundary and the second boundary"). Of all the choice
-with the smallest link angle is taken. The arm keeps its side all the way: to change
-it, it would have to withdraw.
+in proportion between the first boundary and the second boundary"). The link laid past
+it is one link all the way, or of the two links at a joint the one that is beside the
+obstacle: the further the joint is before its middle, the more the end of the link
+behind the joint moves along, up to as much as the joint. Of all the choice with the
+smallest link angle is taken, and of those with the same one that which moves the joints
+least, as the paper takes the nearest point. The arm keeps its side all the way: to
+change it, it would have to withdraw.
 """
 
 from collections.abc import Iterator
@@ -19,7 +23,12 @@ import numpy as np
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.paper.bend_kernels import Bends, Passing, clear_bends, least_moves
+from vdsm_pin.planner.paper.bend_kernels import (
+    Bends,
+    Passing,
+    clear_bends,
+    least_moves,
+)
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.lift import largest_angles
 from vdsm_pin.planner.paper.project import project
@@ -30,6 +39,9 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 
 TRIAL_ROWS: Final = 48
 """Waypoints on which the bends are compared."""
+
+ALIKE: Final = float(np.deg2rad(0.1))
+"""Largest link angles of two choices that count as equal; [rad]."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +54,8 @@ class AcrossRail:
             the side the arm must not pass.
         axis: 0 where w is y, 1 where w is z.
         side: The arm passes at larger w (1) or at smaller w (-1).
-        bends: The joint that moves, 2..N, or the two at the ends of a link.
+        bends: The joint that moves, 2..N, or the two at the ends of a link, or a
+            joint between its neighbours, of which one moves more than in proportion.
         margins: How far the region is grown for each link, shape (N,); [m].
     """
 
@@ -77,9 +90,15 @@ class AcrossRail:
         name = self.region.name
         if len(self.bends) == 1:
             return f"joint {self.bends[0]} bends to pass {name!r}, the others follow"
+        if len(self.bends) == 2:
+            return (
+                f"link {self.bends[0]} is laid past {name!r}: joints {self.bends[0]} "
+                f"and {self.bends[1]} bend, the others follow"
+            )
+        before, joint, after = self.bends
         return (
-            f"link {self.bends[0]} is laid past {name!r}: joints {self.bends[0]} and "
-            f"{self.bends[1]} bend, the others follow"
+            f"link {before} or {joint}, the one beside {name!r}, is laid past it: "
+            f"joint {joint} bends and {before} or {after}, the others follow"
         )
 
     def clearance(self, centres: FloatArray) -> float:
@@ -110,15 +129,19 @@ class AcrossRail:
         planar = reference.copy()
         blocked = np.flatnonzero(~self.clear(reference, tip_x))
         if len(blocked):
-            move = self._least_move(reference[blocked], tip_x[blocked])
-            planar[blocked] = self._moved(reference[blocked], move)
+            planar[blocked] = self._cleared(reference[blocked], tip_x[blocked])
         return planar
 
-    def _least_move(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
-        """Smallest move of the bends that clears the region, signed, (n,); [m]."""
-        farthest = self._farthest(reference)
-        bends = self._arms(reference, tip_x)
-        moves = least_moves(self._passing, bends, farthest)
+    def _cleared(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
+        """The bends moved clear, as `reference`; [m].
+
+        Raises:
+            PathBlocked: If they cannot lead the arm round the obstacle.
+        """
+        shares = self.shares(reference, tip_x)
+        farthest = self._farthest(reference) / shares[:, 0]
+        bends = self._arms(reference, tip_x, shares)
+        moves = np.asarray(least_moves(self._passing, bends, farthest))
         if np.isnan(moves).any():
             row = int(np.argmax(np.isnan(moves)))
             tip = np.array([tip_x[row], *reference[row, -1]])
@@ -128,7 +151,40 @@ class AcrossRail:
                 f"the tip at {self.problem.in_file(tip)}"
             )
             raise PathBlocked(obstacle=self.region.name, reason=reason)
-        return np.asarray(moves)
+        return self.moved(reference, moves[:, None] * shares)
+
+    def shares(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
+        """Part of the move that each of the bends makes, shape (n, k).
+
+        All of it, but for three bends: the neighbours of the joint in the middle move
+        in proportion, and more where the link to them is beside the obstacle.
+        """
+        shares = np.ones((len(reference), len(self.bends)))
+        if len(self.bends) == 3:
+            stations = self.problem.manipulator.stations
+            ahead, end = stations[self._ends[1:-1]], stations[-1]
+            in_part = ahead[0] / ahead[1], (end - ahead[2]) / (end - ahead[1])
+            beyond = self._beyond(reference, tip_x)
+            for k, part, by in ((0, in_part[0], beyond), (2, in_part[1], -beyond)):
+                shares[:, k] = part + (1.0 - part) * np.maximum(by, 0.0)
+        return shares
+
+    def _beyond(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
+        """How far joint j, bending alone, is beyond the middle, in body radii, (n,)."""
+        joint = self.bends[1]
+        alone = replace(self, bends=(joint,))
+        bends = alone._arms(reference, tip_x, np.ones((len(reference), 1)))
+        farthest = alone._farthest(reference)
+        moves = np.asarray(least_moves(alone._passing, bends, farthest))
+        moves = np.where(np.isnan(moves), farthest, moves)
+        planar = alone.moved(reference, moves[:, None])
+        gap = np.linalg.norm(planar[:, -1] - planar[:, joint - 1], axis=1)
+        square = alone._passing.lengths[-1] ** 2 - gap**2
+        x = tip_x - np.sqrt(np.maximum(square, 0.0))
+        corners = self.region.corners[:, 0]
+        middle = 0.5 * (corners.min() + corners.max())
+        reach = self.problem.manipulator.most_radius
+        return np.asarray(np.clip((x - middle) / reach, -1.0, 1.0))
 
     def _farthest(self, reference: FloatArray) -> FloatArray:
         """Largest move to their side that leaves psi_1 within its cone, (n,); [m]."""
@@ -140,23 +196,29 @@ class AcrossRail:
         room = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
         return np.asarray(self.side * room - along)
 
-    def _moved(self, reference: FloatArray, move: FloatArray) -> FloatArray:
-        """Bends moved, the others in proportion, as `reference`; [m]."""
+    def moved(self, reference: FloatArray, moves: FloatArray) -> FloatArray:
+        """Bends moved, the others in proportion, as `reference`; [m].
+
+        Args:
+            reference: The arms before, shape (n, N + 1, 2); [m].
+            moves: Of each of the bends, shape (n, k); [m].
+        """
         stations = self.problem.manipulator.stations
-        knots = stations[self._ends]
-        part = np.interp(stations, knots, [0.0, *[1.0] * len(self.bends), 0.0])
+        hats = np.eye(len(self._ends))[1:-1]
+        parts = [np.interp(stations, stations[self._ends], hat) for hat in hats]
         planar = reference.copy()
-        planar[..., self.axis] += move[:, None] * part
+        planar[..., self.axis] += moves @ np.stack(parts)
         return planar
 
     def clear(self, planar: FloatArray, tip_x: FloatArray) -> BoolArray:
         """Whether the arm of straight pieces stays out of the region, (n,)."""
-        return clear_bends(self._passing, self._arms(planar, tip_x))
+        shares = np.ones((len(planar), len(self.bends)))
+        return clear_bends(self._passing, self._arms(planar, tip_x, shares))
 
-    def _arms(self, planar: FloatArray, tip_x: FloatArray) -> Bends:
+    def _arms(self, planar: FloatArray, tip_x: FloatArray, shares: FloatArray) -> Bends:
         """The arms by the joints that move and their tips."""
         knots = np.ascontiguousarray(planar[:, self._ends[1:-1]])
-        return Bends(knots, planar[:, -1], tip_x)
+        return Bends(knots, planar[:, -1], tip_x, shares)
 
     @cached_property
     def _passing(self) -> Passing:
@@ -171,27 +233,29 @@ class AcrossRail:
         bends = (bend - 1 for bend in self.bends)
         return [0, *bends, self.problem.manipulator.n_links]
 
-    def largest_angle(self, points: FloatArray) -> float:
-        """Largest link angle with the tip at points; infinite where there is none.
+    def costs(self, points: FloatArray) -> tuple[float, float]:
+        """The largest link angle with the tip at points, and how far joints move.
 
-        The link angles follow from the directions of the straight pieces.
+        Both are infinite where there is no way. The link angles follow from the
+        directions of the straight pieces.
 
         Args:
             points: Shape (n, 3); [m].
 
         Returns:
-            The angle; [rad].
+            The angle [rad], and the mean move of all joints [m].
         """
-        manipulator = self.problem.manipulator
-        reference, tip_x = scale(manipulator, project(points)), points[:, 0]
-        blocked = ~self.clear(reference, tip_x)
+        reference, tip_x = (
+            scale(self.problem.manipulator, project(points)),
+            points[:, 0],
+        )
         try:
-            move = self._least_move(reference[blocked], tip_x[blocked])
-            planar = self._moved(reference[blocked], move)
+            planar = self.bent(reference, tip_x)
         except PathBlocked:
-            return np.inf
+            return np.inf, np.inf
         angles = largest_angles(planar[:, self._ends], self._passing.lengths)
-        return float(angles.max(initial=0.0))
+        moves = np.linalg.norm(planar - reference, axis=2)
+        return float(angles.max()), float(moves.mean())
 
 
 def across_rail(
@@ -211,7 +275,8 @@ def across_rail(
     points = drawn_rows(problem.path, 0.0).points
     points = points[:: max(1, len(points) // TRIAL_ROWS)]
     joints = range(2, manipulator.n_links + 1)
-    bends = [*((joint,) for joint in joints), *pairwise(joints)]
+    beside = [(joint - 1, joint, joint + 1) for joint in joints[1:-1]]
+    bends = [*beside, *((joint,) for joint in joints), *pairwise(joints)]
     # The side nearer to the rail first: from there the straight arm comes.
     first = -1 if section.middle[1] > 0.0 else 1
     for side in (first, -first):
@@ -219,7 +284,12 @@ def across_rail(
         choices = [
             AcrossRail(problem, region, which, side, some, margins) for some in bends
         ]
-        yield from sorted(choices, key=lambda choice: choice.largest_angle(points))
+        yield from sorted(choices, key=lambda choice: _rank(*choice.costs(points)))
+
+
+def _rank(angle: float, moved: float) -> tuple[float, float]:
+    """Angles that are alike count as equal: then the joints that move least win."""
+    return float(np.round(angle / ALIKE)), moved
 
 
 def _with_lee(

@@ -1,6 +1,6 @@
 """Compiled Step 5 across the rail: an arm of straight pieces, and its least move.
 
-The joints between the pieces (knots) all move by the same way along one axis: one of
+The joints between the pieces (knots) move along one axis, each by its share: one of
 them, or the two at the ends of a link that is laid past the obstacle.
 """
 
@@ -47,6 +47,9 @@ class Bends(NamedTuple):
     tip_x: FloatArray
     """x of the tip, shape (n,); [m]."""
 
+    shares: FloatArray
+    """Part of the move that each knot makes, shape (n, k - 1); [-]."""
+
 
 @compiled
 def _clear(passing: Passing, bends: Bends, row: int, moved: float) -> bool:
@@ -57,7 +60,7 @@ def _clear(passing: Passing, bends: Bends, row: int, moved: float) -> bool:
     for i in range(lengths.shape[0] - 1, -1, -1):
         next_along, next_across = 0.0, 0.0
         if i > 0:
-            next_along = knots[i - 1, axis] + moved
+            next_along = knots[i - 1, axis] + moved * bends.shares[row, i - 1]
             next_across = knots[i - 1, 1 - axis]
         square = lengths[i] ** 2 - (along - next_along) ** 2
         square -= (across - next_across) ** 2
