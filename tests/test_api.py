@@ -260,20 +260,23 @@ def test_results_show_themselves_in_a_few_lines() -> None:
         ("obs1", "paper", -61.4),
         ("obs1", "fewest", -45.0),
         ("obs2", "paper", -40.1),
-        ("obs2", "fewest", -6.4),
+        ("obs2", "fewest", -26.8),
         ("obs2-small", "paper", -28.3),
         ("obs2-small", "fewest", -13.4),
         ("obs3", "paper", -27.4),
-        ("obs3", "fewest", -12.2),
+        ("obs3", "fewest", None),
     ],
 )
 def test_the_papers_joint_error_touches(
-    scene: str, strategy: str, depth_mm: float
+    scene: str, strategy: str, depth_mm: float | None
 ) -> None:
     """The table of docs/paper.md: every joint off by 0.3 deg, in the worst case."""
     problem = vp.read_problem(f"paper/{scene}")
     plan = vp.plan(problem, strategy)
     result = vp.verify(problem, plan.trajectory, errors=vp.ErrorBox(joint_deg=0.3))
+    if depth_mm is None:
+        assert result.verdict is vp.Verdict.CERTIFIED
+        return
     assert result.verdict is vp.Verdict.REFUTED
     worst = min(found.clearance for found in result.counterexamples)
     assert depth_mm - 0.1 < 1e3 * worst <= depth_mm  # at least so deep

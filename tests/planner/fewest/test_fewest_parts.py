@@ -13,12 +13,13 @@ from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.interval_parts import bow_bounds
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows
+from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows, standing
 from vdsm_pin.planner.fewest.offset_kernels import mutated_offsets
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
-from vdsm_pin.planner.fewest.roadmap import CostWeights, build_roadmap
-from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
+from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
+from vdsm_pin.planner.fewest.roadmap_kernels import _drawing, _resting, pose_shapes
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
+from vdsm_pin.planner.fewest.sequence import WEIGHTS
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
 from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.planner.spacing import row_steps
@@ -121,6 +122,34 @@ def test_bent_arms_are_tried_only_near_where_the_straight_one_does_not_do() -> N
         assert np.diff(every.tip_nodes)[tip] == np.diff(some.tip_nodes)[tip]
     again = some.index[np.arange(len(route.tips)) * shapes.size]
     np.testing.assert_array_equal(again >= 0, straight >= 0)
+
+
+def test_between_two_nodes_all_joints_bend_that_do_at_either() -> None:
+    """What moves cost, against link angles of the arms themselves."""
+    task, graph = problem(PILLAR), roadmap_of(problem(PILLAR))
+    arm, made = task.manipulator, graph.graph()
+    every = np.arange(len(graph.node))
+    centres = standing(arm, *graph.poses_of(arm, every))
+    bent = link_angles(*joint_angles(arm, centres)) > TOLERANCES.changed_angle
+    assert {tuple(np.flatnonzero(row)) for row in bent} >= {(0,), (3,), (0, 3), (0, 4)}
+    rng, weights = np.random.default_rng(3), WEIGHTS._replace(angle=0.7)
+    for u, v in rng.integers(len(every), size=(300, 2)):
+        left, new = (bent[u] & ~bent[v]).sum(), (bent[v] & ~bent[u]).sum()
+        more = weights.more * bool(left and new)
+        drawn, rests = _drawing(made, weights, 0.1, u, v), _resting(made, weights, u, v)
+        assert drawn == pytest.approx(0.1 * 0.7 * left + more, abs=1e-12)
+        strain = 0.5 * (graph.strain[u] + graph.strain[v])
+        every_bent = weights.still * (bent[u] | bent[v]).sum()
+        assert rests == pytest.approx(every_bent + more + strain, abs=1e-12)
+
+
+def roadmap_of(task: PlanningProblem) -> Roadmap:
+    """All shapes at all tips, coarse."""
+    rows = path_rows(task.path)
+    route = tip_route(task, rows, np.zeros(len(rows.tips), dtype=np.bool_), 0.08, 0.0)
+    shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
+    judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)
+    return build_roadmap(judge, CostWeights(), route, shapes)
 
 
 def test_a_motion_through_a_thin_plate_is_refused_though_both_ends_are_clear() -> None:

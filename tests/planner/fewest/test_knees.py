@@ -7,13 +7,17 @@ import pytest
 from scenes_for_fewest import problem
 
 from benchmarks.hrm1000.generate import generate
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners
+from vdsm_pin.planner.fewest.shortcut import shortcut
 from vdsm_pin.planner.fewest.sparsify import mean_knees
-from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.fewest.strategy import FEWEST, plan_fewest
 from vdsm_pin.report.motion_facts import motion_facts
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 
 
@@ -33,6 +37,31 @@ def test_knees_are_those_of_either_end_by_the_length_drawn() -> None:
     assert mean_knees(judge, corners) == pytest.approx((3.0 * 4 + 1.0 * 3) / 4.0)
     resting = Corners(tips, offsets, stations, ~drawn & False)
     assert mean_knees(judge, resting) == pytest.approx((4 + 4 + 3) / 3.0)
+
+
+def test_obs3_changes_two_link_angles_at_most() -> None:
+    """Its knees change where psi_5 alone is bent, or where the arm is straight."""
+    task = read_problem("paper/obs3")
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    angles = link_angles(plan.trajectory.alpha, plan.trajectory.theta)
+    changed = (angles > TOLERANCES.changed_angle).sum(axis=1)[plan.trajectory.on_path]
+    assert changed.max() == 2
+    assert changed.mean() < 1.44
+    facts = motion_facts(task, plan.trajectory)
+    assert facts.changed_angles_mean_on_path == pytest.approx(1.4035, abs=5e-4)
+
+
+@pytest.mark.parametrize("name", ["paper/obs1", "paper/obs2", "paper/obs3"])
+def test_shortcuts_bend_no_more_joints_and_leave_no_larger_angle(name: str) -> None:
+    """By the length drawn, between corners too, as `mean_knees` counts them."""
+    task = read_problem(name)
+    *_, outcome = explore(task, broad_phase(task, link_clearance(task)), 0.0, FEWEST)
+    assert outcome.found is not None
+    judge, before = outcome.judge, outcome.found.corners
+    after = shortcut(judge, before, FEWEST)
+    assert mean_knees(judge, after) <= mean_knees(judge, before) + 1e-3
+    largest = [judge.bends(one.tips, one.offsets).max() for one in (after, before)]
+    assert largest[0] <= max(largest[1], FEWEST.easy_bend)
 
 
 def test_an_insertion_of_many_knees_leaves_the_roadmap_its_turn(tmp_path: Path) -> None:

@@ -18,6 +18,8 @@ from vdsm_pin.tolerances import TOLERANCES
 STRAIN: Final = 0.032
 """Length, over the arm's, by which a way into a configuration at its limits is longer;
 [-]."""
+LAST_BIT: Final = 62
+"""Of the numbers that say which joints are bent."""
 KNEES: Final = slice(1, None)
 """Columns of bends past psi_1, the bend at the base."""
 
@@ -58,6 +60,8 @@ class Roadmap:
         cost: Cost of a length drawn, shape (v,).
         strain: What entering a node adds to the length of a way, over the arm's length,
             shape (v,); [-].
+        bent: Which joints are bent, a bit each, shape (v,).
+        angle: What one changed angle adds to the cost of a length drawn.
     """
 
     route: TipRoute
@@ -68,19 +72,23 @@ class Roadmap:
     lean: FloatArray
     cost: FloatArray
     strain: FloatArray
+    bent: IntArray
+    angle: float
 
     @classmethod
-    def empty(cls, route: TipRoute, shapes: Shapes) -> "Roadmap":
+    def empty(cls, route: TipRoute, shapes: Shapes, angle: float) -> "Roadmap":
         """Without nodes."""
         none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
-        return cls(route, shapes, none, none, none, nothing, nothing, nothing)
+        numbers = (none, none, none, nothing, nothing, nothing, none)
+        return cls(route, shapes, *numbers, angle)
 
     def graph(self) -> Graph:
         """What the compiled loops read."""
         shapes = self.shapes
         return Graph(
             shapes.size, shapes.n_lattice, self.index, self.node, self.tip_nodes,
-            shapes.first, shapes.neighbours, shapes.change, self.lean,
+            shapes.first, shapes.neighbours, shapes.change, self.lean, self.bent,
+            self.strain,
         )  # fmt: skip
 
     def tips_of(self, nodes: IntArray) -> IntArray:
@@ -141,7 +149,8 @@ def build_roadmap(
         if margins is not None or not problem.held.alike:
             ends = link_by_link(ends, arm.stations)
         clearances = _least(judge, ends)
-        keep, empty = clearances >= judge.required, Roadmap.empty(route, shapes)
+        keep = clearances >= judge.required
+        empty = Roadmap.empty(route, shapes, weights.angle)
         return _with_nodes(
             empty, judge, weights, node[keep], bends[keep], clearances[keep]
         )
@@ -228,7 +237,8 @@ def _with_nodes(
         judge: Says what nodes keep.
         weights: What the strategy prefers.
         node: Of each new node, see `Roadmap`, shape (g,).
-        bends: Link angles of each, shape (g, k); [rad].
+        bends: Link angles of each, of all joints or of joint 1 and the knee, shape
+            (g, k); [rad].
         clearances: Clearance of each, shape (g,); [m].
     """
     n_tips, n_shapes = len(roadmap.route.tips), roadmap.shapes.size
@@ -246,7 +256,19 @@ def _with_nodes(
         lean=np.concatenate([roadmap.lean, lean])[order],
         cost=np.concatenate([roadmap.cost, cost])[order],
         strain=np.concatenate([roadmap.strain, strain])[order],
+        bent=np.concatenate([roadmap.bent, _bent(roadmap.shapes, node, bends)])[order],
     )
+
+
+def _bent(shapes: Shapes, node: IntArray, bends: FloatArray) -> IntArray:
+    """Which joints are bent, a bit each; joints past the last bit share it, (g,)."""
+    joints = np.broadcast_to(np.arange(bends.shape[1]), bends.shape)
+    if (node % shapes.size < shapes.n_lattice).all():
+        knees = shapes.knees[node % shapes.size]
+        joints = np.stack([np.zeros_like(knees), knees], axis=1)
+    changed = bends > TOLERANCES.changed_angle
+    bits = np.where(changed, 1 << np.minimum(joints, LAST_BIT), 0)
+    return np.asarray(np.bitwise_or.reduce(bits, axis=1, initial=0))
 
 
 def extended(

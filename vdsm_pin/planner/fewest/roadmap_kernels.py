@@ -26,6 +26,8 @@ class Graph(NamedTuple):
         neighbours: See `Shapes`.
         change: See `Shapes`.
         lean: Sum of the knees' angles, joint 1 left out, shape (v,); [rad].
+        bent: Which joints are bent, a bit each, shape (v,).
+        strain: See `Roadmap`, shape (v,); [-].
     """
 
     n_shapes: int
@@ -37,6 +39,8 @@ class Graph(NamedTuple):
     neighbours: IntArray
     change: FloatArray
     lean: FloatArray
+    bent: IntArray
+    strain: FloatArray
 
 
 class Barred(NamedTuple):
@@ -68,17 +72,21 @@ class Weights(NamedTuple):
 
     Args:
         turn: Cost of a radian of turning.
-        still: Cost of a step at rest.
+        still: Cost of each angle that is changed in a step at rest.
+        more: Cost of a move in which more joints are bent than at either end.
         visit: Cost of a visit to the start.
         connection: Cost of a length of a connection.
         skip: Cost of a length not drawn.
+        angle: Cost of a length drawn with one changed angle.
     """
 
     turn: float
     still: float
+    more: float
     visit: float
     connection: float
     skip: float
+    angle: float = 1.0
 
 
 class Labels(NamedTuple):
@@ -202,6 +210,40 @@ def is_blocked(u: int, v: int, barred: Barred) -> bool:
 
 
 @compiled
+def count_bits(mask: int) -> int:
+    """How many joints are bent."""
+    count = 0
+    while mask:
+        mask &= mask - 1
+        count += 1
+    return count
+
+
+@compiled
+def _resting(graph: Graph, weights: Weights, u: int, v: int) -> float:
+    """Cost of what bends from a shape to another: all joints that are bent at either.
+
+    Nothing is drawn, so that being near the limits is counted as on ways off the path.
+    """
+    one, other = graph.bent[u], graph.bent[v]
+    cost = weights.still * count_bits(one | other)
+    if one & ~other and other & ~one:
+        cost += weights.more
+    return float(cost + 0.5 * (graph.strain[u] + graph.strain[v]))
+
+
+@compiled
+def _drawing(graph: Graph, weights: Weights, gap: float, u: int, v: int) -> float:
+    """Cost of what bends along a gap and not at its end, the node v."""
+    one, other = graph.bent[u], graph.bent[v]
+    left = one & ~other
+    if not left:
+        return 0.0
+    cost = weights.angle * gap * count_bits(left)
+    return cost + (weights.more if other & ~one else 0.0)
+
+
+@compiled
 def _settle(
     graph: Graph, tip: int, weights: Weights, labels: Labels, barred: Barred
 ) -> None:
@@ -219,12 +261,16 @@ def _settle(
                 u = graph.place[corner + graph.neighbours[e]]
                 if u < 0:
                     continue
-                value = cost[u] + weights.turn * graph.change[e] + weights.still
+                value = cost[u] + weights.turn * graph.change[e]
+                if not value < cost[v] - GAIN:
+                    continue
+                value += _resting(graph, weights, u, v)
                 if value < cost[v] - GAIN and not is_blocked(u, v, barred):
                     cost[v], parent[v], better = value, u, True
             if straight >= 0 and v != straight and graph.lean[v] <= NEAR:
                 a, b = (straight, v) if cost[straight] < cost[v] else (v, straight)
-                value = cost[a] + weights.turn * graph.lean[v] + weights.still
+                value = cost[a] + weights.turn * graph.lean[v]
+                value += _resting(graph, weights, a, b)
                 if value < cost[b] - GAIN and not is_blocked(a, b, barred):
                     cost[b], parent[b], better = value, a, True
         sweep += 1
@@ -232,30 +278,44 @@ def _settle(
 
 @compiled
 def _draw(
-    graph: Graph, before: int, tip: int, turn: float, labels: Labels, barred: Barred
+    graph: Graph,
+    before: int,
+    tip: int,
+    weights: Weights,
+    gap: float,
+    labels: Labels,
+    barred: Barred,
 ) -> None:
-    """Moves from one layer's tip to the next one's, what is drawn not yet counted.
+    """Moves from one layer's tip to the next one's, the node come to not yet counted.
+
+    Joints bent at the node left alone are bent in between too, and counted here.
 
     Args:
         graph: The roadmap.
         before: The tip before.
         tip: This tip.
-        turn: Cost of a radian of turning.
+        weights: What moves cost.
+        gap: Path length in between over the arm's length; [-].
         labels: Costs so far.
         barred: Blocked edges.
     """
     cost, parent, corner = labels.cost, labels.parent, before * graph.n_shapes
-    straight = graph.place[corner]
+    straight, turn = graph.place[corner], weights.turn
     for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
         c = graph.node[v] - tip * graph.n_shapes
         u = graph.place[corner + c]
         if u >= 0 and cost[u] < cost[v] and not is_blocked(u, v, barred):
-            cost[v], parent[v] = cost[u], u
+            value = cost[u] + _drawing(graph, weights, gap, u, v)
+            if value < cost[v]:
+                cost[v], parent[v] = value, u
         for e in range(graph.first[c], graph.first[c + 1]):
             u = graph.place[corner + graph.neighbours[e]]
             if u < 0:
                 continue
             value = cost[u] + turn * graph.change[e]
+            if not value < cost[v]:
+                continue
+            value += _drawing(graph, weights, gap, u, v)
             if value < cost[v] and not is_blocked(u, v, barred):
                 cost[v], parent[v] = value, u
         low, high = graph.tip_nodes[before], graph.tip_nodes[before + 1]
@@ -267,7 +327,8 @@ def _draw(
             value = cost[u] + turn * (graph.lean[v] + graph.lean[u])
             if graph.lean[u] > NEAR or not value < cost[v]:
                 continue
-            if not is_blocked(u, v, barred):
+            value += _drawing(graph, weights, gap, u, v)
+            if value < cost[v] and not is_blocked(u, v, barred):
                 cost[v], parent[v] = value, u
 
 
@@ -307,7 +368,7 @@ def stage_programme(
     for k in range(layers.size):
         tip = layers[k]
         if k > 0:
-            _draw(graph, layers[k - 1], tip, weights.turn, labels, barred)
+            _draw(graph, layers[k - 1], tip, weights, gap[k], labels, barred)
             for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
                 labels.cost[v] += node_cost[v] * gap[k]
             at_start += weights.skip * gap[k]

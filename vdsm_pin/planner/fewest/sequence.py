@@ -24,7 +24,9 @@ from vdsm_pin.planner.fewest.roadmap_kernels import (
 )
 from vdsm_pin.planner.fewest.shortest_paths import TipLinks, shortest_paths
 
-WEIGHTS = Weights(turn=0.048, still=0.0064, visit=0.96, connection=0.05, skip=1000.0)
+WEIGHTS = Weights(
+    turn=0.048, still=0.0032, more=0.04, visit=0.96, connection=0.05, skip=1000.0
+)
 """Costs in arm lengths drawn with one changed angle more."""
 REST = 0.0032
 """Length over the arm's that drawing a single point counts for; [-]."""
@@ -130,7 +132,7 @@ class SequenceSearch:
         """The cheapest sequence under the edges blocked so far."""
         labels, start_cost, left_from = stage_programme(
             self.graph, self.roadmap.route.layers, self.gap, self.roadmap.cost,
-            self.from_start, WEIGHTS, self.barred,
+            self.from_start, WEIGHTS._replace(angle=self.roadmap.angle), self.barred,
         )  # fmt: skip
         return self._trace(labels, start_cost, left_from)
 

@@ -2,15 +2,19 @@
 
 import itertools
 from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, distinct
-from vdsm_pin.planner.fewest.judge import Judge, Looks
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.tolerances import TOLERANCES
+
+REST: Final = 3e-4
+"""Length over the arm's that a change of shape counts for while the tip rests; [-]."""
 
 
 def _runs(corners: Corners) -> list[tuple[int, int]]:
@@ -82,6 +86,25 @@ def _spans(corners: Corners, stride: int, phase: int) -> list[tuple[int, int]]:
     return spans
 
 
+class _State(NamedTuple):
+    """What corners come to."""
+
+    clearances: FloatArray
+    """As of `Looks`, shape (n,); [m]."""
+
+    bent: BoolArray
+    """Whether joints are changed, shape (n, N)."""
+
+    largest: FloatArray
+    """Largest link angle, shape (n,); [rad]."""
+
+    @classmethod
+    def of(cls, judge: Judge, corners: Corners) -> "_State":
+        bends = judge.bends(corners.tips, corners.offsets)
+        clearances = judge.look(corners.tips, corners.offsets).clearances
+        return cls(clearances, bends > TOLERANCES.changed_angle, bends.max(axis=1))
+
+
 def shortcut(judge: Judge, corners: Corners, weights: CostWeights) -> Corners:
     """Corners pulled straight wherever that keeps clearance, limits and sparsity.
 
@@ -89,23 +112,23 @@ def shortcut(judge: Judge, corners: Corners, weights: CostWeights) -> Corners:
     """
     longest = max(b - a for a, b in _runs(corners))
     stride = 1 << max(1, int(np.ceil(np.log2(max(longest, 2)))))
-    state = judge.look(corners.tips, corners.offsets)
-    while stride >= 2:
+    state = _State.of(judge, corners)
+    strides = [stride >> k for k in range(stride.bit_length() - 1)]
+    for stride in (*strides, *strides[-3:]):
         for phase in (0, stride // 2):
             spans = _spans(corners, stride, phase)
             if spans:
                 corners, state = _round(judge, corners, state, weights, spans)
-        stride //= 2
     return corners
 
 
 def _round(
     judge: Judge,
     corners: Corners,
-    state: Looks,
+    state: _State,
     weights: CostWeights,
     spans: list[tuple[int, int]],
-) -> tuple[Corners, Looks]:
+) -> tuple[Corners, _State]:
     trial = _flattened(judge, corners, spans)
     gap = np.abs(trial.offsets - corners.offsets).max(axis=(1, 2))
     gap = np.maximum(gap, np.abs(trial.tips - corners.tips).max(axis=1))
@@ -114,10 +137,12 @@ def _round(
     if not spans:
         return corners, state
     picked = np.concatenate([np.arange(a, b) for a, b in spans])
-    new = Looks._make(values.copy() for values in state)
+    new = _State._make(values.copy() for values in state)
     bends = judge.bends(trial.tips[picked], trial.offsets[picked])
-    new.changed[picked] = (bends > TOLERANCES.changed_angle).sum(axis=1)
+    new.bent[picked] = bends > TOLERANCES.changed_angle
     new.largest[picked] = bends.max(axis=1)
+    lengths = np.abs(np.diff(corners.stations))
+    lengths += REST * judge.problem.manipulator.total_length
     need, bend = _guards(judge, corners, state, weights, spans)
     good, new.clearances[picked] = judge.measured(
         judge.lines(trial, picked), need, bend
@@ -128,19 +153,32 @@ def _round(
     for a, b in spans:
         inner, clear = slice(a + 1, b), good[place : place + b - a].all()
         # Where the tip draws, no more joints may bend over a span than before.
-        fewer = new.changed[inner].sum() <= state.changed[inner].sum()
+        span, own = slice(a, b + 1), lengths[a:b]
+        before, after = _knees(state.bent[span], own), _knees(new.bent[span], own)
+        fewer = after <= before + TOLERANCES.joint_centre
         if clear and (fewer or not corners.drawn[a]):
             kept.append((a, b))
             taken[inner] = True
         place += b - a
-    state = Looks._make(np.where(taken, *both) for both in zip(new, state, strict=True))
+    for old, values in zip(state, new, strict=True):
+        old[taken] = values[taken]
     return _flattened(judge, corners, kept), state
+
+
+def _knees(bent: BoolArray, lengths: FloatArray) -> float:
+    """Changed angles times lengths: between corners all bend that do at either.
+
+    Args:
+        bent: Whether joints are changed at corners, shape (n, N).
+        lengths: From corner to corner, shape (n - 1,).
+    """
+    return float(((bent[:-1] | bent[1:]).sum(axis=1) * lengths).sum())
 
 
 def _guards(
     judge: Judge,
     corners: Corners,
-    state: Looks,
+    state: _State,
     weights: CostWeights,
     spans: list[tuple[int, int]],
 ) -> tuple[FloatArray, FloatArray]:
