@@ -9,6 +9,9 @@ import tomllib
 from pathlib import Path
 from typing import Any, Final
 
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
 ROOT: Final = Path(__file__).parents[1]
 TARGET: Final = ROOT / "docs" / "dependencies.md"
 
@@ -44,7 +47,8 @@ LONGEST: Final = 60
 def licence(metadata: Any) -> str:
     """The licence that a distribution states, in a few words."""
     stated = metadata.get("License-Expression") or metadata.get("License") or ""
-    if stated and len(stated) <= LONGEST and "\n" not in stated:
+    short = len(stated) <= LONGEST and "\n" not in stated
+    if short and stated not in ("", "UNKNOWN"):
         return str(stated)
     for line in metadata.get_all("Classifier", []):
         if line.startswith("License ::"):
@@ -67,6 +71,24 @@ def rows(requirements: list[str]) -> list[str]:
     return lines
 
 
+def brought(requirements: list[str]) -> list[str]:
+    """Names of what distributions bring along on this machine, without themselves."""
+    asked = [Requirement(line) for line in requirements]
+    named = {canonicalize_name(one.name) for one in asked}
+    seen: dict[str, set[str]] = {}  # with which extras each was looked at
+    while asked:
+        one = asked.pop()
+        name = canonicalize_name(one.name)
+        new = {"", *one.extras} - seen.get(name, set())
+        seen.setdefault(name, set()).update(new)
+        for extra in new:
+            for line in importlib.metadata.requires(name) or []:
+                more = Requirement(line)
+                if more.marker is None or more.marker.evaluate({"extra": extra}):
+                    asked.append(more)
+    return sorted(seen.keys() - named)
+
+
 def main() -> None:
     """Write the page."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -75,12 +97,23 @@ def main() -> None:
     lines = [
         "# Dependencies",
         "",
+        "What `pip install vdsm-pin` installs, for what, and under which licence.",
         "Written by `analysis/dependencies.py` from what is installed. The package is",
         "under BSD-2-Clause; `constraints.txt` pins every version the tests ran with.",
         "",
         *head,
         *rows(found["dependencies"]),
     ]
+    lines += [
+        "",
+        "## What these bring along",
+        "",
+        "| distribution | tested with | licence |",
+        "|---|---|---|",
+    ]
+    for name in brought(found["dependencies"]):
+        metadata = importlib.metadata.metadata(name)
+        lines.append(f"| {name} | {metadata['Version']} | {licence(metadata)} |")
     for extra, requirements in found["optional-dependencies"].items():
         if extra not in ("dev", "docs"):
             command = f"pip install 'vdsm-pin[{extra}]'"

@@ -6,7 +6,7 @@ import sys
 import tomllib
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import packages_distributions
+from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 
 import pytest
@@ -95,3 +95,15 @@ def test_the_scan_sees_what_is_not_declared() -> None:
     assert "lxml" in imported("tests")
     assert "lxml" not in declared()
     assert "playwright" in imported("tests")
+
+
+def test_the_page_lists_what_is_brought_along() -> None:
+    """Oracle: requirements that the installed distributions state, followed by hand."""
+    page = (ROOT / "docs" / "dependencies.md").read_text("utf-8").split("## cluster")[0]
+    rows = [line for line in page.splitlines() if line.startswith("| ")]
+    listed = {plain(line.split("|")[1].strip()) for line in rows}
+    assert declared() <= listed
+    for name in listed - {"distribution"}:
+        for line in requires(name) or []:
+            if ";" not in line:
+                assert plain(re.split(r"[<>=!~\[( ;]", line)[0]) in listed, line
