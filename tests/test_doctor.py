@@ -1,6 +1,7 @@
 """`vdsm doctor` names what is missing and how to get it."""
 
 import importlib.metadata
+import sys
 import tomllib
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +14,7 @@ from vdsm_pin.app import doctor
 from vdsm_pin.app.doctor import Finding, examine
 from vdsm_pin.cli import main
 from vdsm_pin.io.atomic import writing
+from vdsm_pin.report import run_record
 
 ROOT = Path(__file__).parents[1]
 NO_OPENMP = "libgomp.so.1: cannot open shared object file"
@@ -35,20 +37,42 @@ def test_a_missing_library_is_named_with_its_remedy(
 ) -> None:
     real = importlib.metadata.version
 
-    def without_coal(name: str) -> str:
-        if name in ("coal", "distributed"):
+    def without_shapely(name: str) -> str:
+        if name in ("shapely", "distributed"):
             raise importlib.metadata.PackageNotFoundError(name)
         return real(name)
 
-    monkeypatch.setattr(importlib.metadata, "version", without_coal)
+    monkeypatch.setattr(importlib.metadata, "version", without_shapely)
     with pytest.raises(SystemExit) as ended:
         main(["doctor"])
     lines = capsys.readouterr().out.splitlines()
     assert ended.value.code == 1
-    assert "✗ coal           not installed; pip install coal" in lines
+    assert "✗ shapely        not installed; pip install shapely" in lines
     (cluster,) = [line for line in lines if " cluster " in line]
     assert cluster.startswith("– ")
     assert cluster.endswith("pip install 'vdsm-pin[cluster]'")
+
+
+def test_a_library_without_metadata_is_known_by_its_module(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As conda installs Pinocchio and Coal."""
+    real, told = importlib.metadata.version, {"pin": "pinocchio", "coal": "coal"}
+
+    def without_metadata(name: str) -> str:
+        if name in told:
+            raise importlib.metadata.PackageNotFoundError(name)
+        return real(name)
+
+    run_record.versions()  # kept for other tests
+    monkeypatch.setattr(importlib.metadata, "version", without_metadata)
+    for name, module in told.items():
+        assert found(name).works
+        assert found(name).found == import_module(module).__version__
+        assert run_record.versions.__wrapped__()[name] == found(name).found
+    del told["coal"]
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    assert not found("pin").works
 
 
 def test_a_library_that_the_system_cannot_load_is_told(

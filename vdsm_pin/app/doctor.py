@@ -13,7 +13,7 @@ from vdsm_pin import kept
 from vdsm_pin.compiled import plain_numba
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.report.film import find_browser, find_encoder
-from vdsm_pin.report.run_record import machine, versions
+from vdsm_pin.report.run_record import machine, version_of, versions
 
 USES: Final = {
     "cluster": "vdsm batch --scheduler: many machines",
@@ -85,7 +85,7 @@ def _libraries() -> Iterator[Finding]:
         what = f"unknown: {_DISTRIBUTION} itself is not installed"
         yield Finding("libraries", what, False, True, f"pip install {_DISTRIBUTION}")
     for name in _required(""):
-        if (version := _version(name)) is None:
+        if (version := version_of(name)) is None:
             yield Finding(name, "not installed", False, True, f"pip install {name}")
         elif why := _does_not_load(name):
             yield Finding(
@@ -149,7 +149,7 @@ def _encoder() -> Finding:
 def _extras() -> Iterator[Finding]:
     for extra, use in USES.items():
         names = _required(extra)
-        missing = [name for name in names if _version(name) is None]
+        missing = [name for name in names if version_of(name) is None]
         if names and not missing:
             yield Finding(extra, use, True)
             continue
@@ -175,10 +175,3 @@ def _required(extra: str) -> list[str]:
         if (asked.group(1) if asked else "") == extra:
             names.append(re.split(r"[^\w.-]", wanted.strip())[0])
     return names
-
-
-def _version(name: str) -> str | None:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return None

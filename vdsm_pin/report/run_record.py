@@ -3,10 +3,11 @@
 import os
 import platform
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
-from importlib import metadata
+from importlib import import_module, metadata
 from typing import Final
 
 from vdsm_pin import __version__
@@ -14,6 +15,9 @@ from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.text import printable
 
 _LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "yourdfpy", "meshcat")
+
+_MODULES: Final = {"pin": "pinocchio", "coal": "coal"}
+"""Libraries that conda installs without the metadata of a Python distribution."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +68,18 @@ def versions() -> dict[str, str]:
     """Versions of everything a number in the report may depend on."""
     known = {"vdsm-pin": __version__, "python": platform.python_version()}
     for name in _LIBRARIES:
-        try:
-            known[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            known[name] = "not installed"
+        known[name] = version_of(name) or "not installed"
     return known
+
+
+def version_of(name: str) -> str | None:
+    """The version of an installed library; None where it is not installed."""
+    with suppress(metadata.PackageNotFoundError):
+        return metadata.version(name)
+    if name in _MODULES:
+        with suppress(ImportError):
+            return str(import_module(_MODULES[name]).__version__)
+    return None
 
 
 @cache
