@@ -21,10 +21,10 @@ from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
-from vdsm_pin.planner.fewest import elastic_band, insertion
+from vdsm_pin.planner.fewest import elastic_band, insertion, tip_routes
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
-from vdsm_pin.planner.fewest.elastic_band import resampled
+from vdsm_pin.planner.fewest.elastic_band import QUICK, THOROUGH, resampled
 from vdsm_pin.planner.fewest.follow_the_leader import (
     followed,
     led_along,
@@ -39,6 +39,7 @@ from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.fewest.tip_cells import TipCells
 from vdsm_pin.planner.fewest.tip_room import TipRoom
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.records import Plan
@@ -280,6 +281,37 @@ def test_a_second_way_is_short_where_the_first_is_wide() -> None:
     assert 0.3 < abs(side_of(wide)) < 0.6
     assert abs(side_of(short)) < half
     assert length_of(short) < length_of(wide) - 0.02
+
+
+def test_a_longer_pull_comes_before_a_way_that_takes_long_to_find(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    task = two_ways(0.25)
+    space, asked, efforts = space_of(task), list[int](), list[object]()
+    cheapest = TipCells.cheapest
+
+    def looked_for(
+        cells: TipCells,
+        start: FloatArray,
+        goal: FloatArray,
+        most: int,
+        shortest: bool = False,
+    ) -> FloatArray | None:
+        asked.append(most)
+        few = len(asked) == 2
+        return None if few else cheapest(cells, start, goal, space.most, shortest)
+
+    def pulled(_: TipSpace, short: FloatArray, effort: object) -> FloatArray:
+        efforts.append(effort)
+        return short
+
+    monkeypatch.setattr(TipCells, "cheapest", looked_for)
+    monkeypatch.setattr(TipSpace, "_pulled", pulled)
+    monkeypatch.setattr(tip_routes, "is_followed", lambda *_: False)
+    ways = list(space.routes(task.path.points[0], 3))
+    assert len(ways) == 3
+    assert efforts == [QUICK, THOROUGH, QUICK]
+    assert asked[1] < asked[0] == asked[2] == space.most
 
 
 def test_ways_avoid_where_an_arm_got_stuck() -> None:

@@ -9,6 +9,7 @@ motion: nothing is proved here.
 from collections.abc import Iterator
 from copy import copy
 from itertools import islice
+from typing import Final
 
 import numpy as np
 
@@ -31,6 +32,10 @@ from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.tolerances import TOLERANCES
+
+LONGER: Final = 3
+"""Times as many cells as before after which a longer pull of the last way comes before
+another way; [-]."""
 
 
 class TipSpace:
@@ -145,7 +150,12 @@ class TipSpace:
             cells.avoided = [*narrow, *self.stuck]
             # What is wide may be a detour on which the arm cannot follow.
             shortest = not shortest
-            route = cells.cheapest(start, goal, self.most, shortest)
+            few = min(LONGER * cells.codes.size, self.most)
+            route = cells.cheapest(start, goal, few, shortest)
+            if route is None and before:
+                yield self._pulled(before.pop(), THOROUGH)
+            if route is None:
+                route = cells.cheapest(start, goal, self.most, shortest)
         for short in before:
             yield self._pulled(short, THOROUGH)
 
