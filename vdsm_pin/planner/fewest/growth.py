@@ -136,7 +136,8 @@ class Population:
         tips = np.repeat(self.layers.tips[:1], len(roots), axis=0)
         none = np.full(len(roots), -1)
         clearances = self.judge.look(tips, roots).clearances
-        self.grown = Grown(1 + none, tips, roots, clearances, none)
+        self.room = Grown(1 + none, tips, roots, clearances, none)
+        self.count = len(roots)
         farthest = np.arange(len(roots))
         generations, backtracks = [farthest], 0
         leader = farthest[:1] if self.led is None else self._leader()
@@ -160,12 +161,23 @@ class Population:
             backtracks += 1
         return self.grown.with_ancestors(self._best(farthest, kept))
 
+    @property
+    def grown(self) -> Grown:
+        """The arms on record."""
+        return Grown._make(values[: self.count] for values in self.room)
+
     def _recorded(self, born: Grown) -> IntArray:
         """Numbers of arms after they are put on record."""
-        before = len(self.grown.layer)
-        both = zip(self.grown, born, strict=True)
-        self.grown = Grown._make(np.concatenate(one) for one in both)
-        return before + np.arange(len(born.layer))
+        first, self.count = self.count, self.count + len(born.layer)
+        if self.count > len(self.room.layer):
+            # Twice the room at once, so that arms are seldom copied.
+            self.room = Grown._make(
+                np.pad(values, [(0, self.count), *[(0, 0)] * (values.ndim - 1)])
+                for values in self.room
+            )
+        for values, new in zip(self.room, born, strict=True):
+            values[first : self.count] = new
+        return first + np.arange(len(born.layer))
 
     def _leader(self) -> IntArray:
         """The arm that follows the tip's route, layer by layer as far as it is clear.
