@@ -304,6 +304,24 @@ def test_what_is_grown_passes_an_obstacle_by_ways_that_are_clear() -> None:
         assert judge.clear(ways).all()
 
 
+def test_intervals_are_judged_alike_in_blocks_of_any_size(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    task = problem(PILLAR)
+    judge, chain = (
+        Judge(task, link_clearance(task), 0.0, 0.0, 2e-3),
+        wandering(task, 3, 60),
+    )
+    whole = judge.measured(chain)
+    for size in (1, 7, 60):
+        monkeypatch.setattr("vdsm_pin.planner.fewest.judge.BLOCK", size)
+        good, begin = judge.measured(chain)
+        np.testing.assert_array_equal(good, whole[0])
+        # Below 0 the sign alone is meant.
+        np.testing.assert_allclose(begin.clip(0.0), whole[1].clip(0.0), atol=1e-9)
+    assert 0 < whole[0].sum() < len(whole[0])
+
+
 def test_a_motion_past_a_limit_is_refused() -> None:
     task = problem()
     judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)

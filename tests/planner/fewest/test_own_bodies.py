@@ -5,9 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.mounted import LinkBody
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box
+from vdsm_pin.planner.fewest.charts import coordinates
+from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -43,10 +48,58 @@ def test_cameras_keep_off_the_next_link(side: float, y: float, joint: float) -> 
     assert found.verification.verdict is Verdict.CERTIFIED
 
 
+def chart_lines(
+    arm: Manipulator, begin: FloatArray, end: FloatArray
+) -> tuple[Intervals, FloatArray]:
+    """The straight line in the chart between joint values, and its ends' centres."""
+    rows = np.stack([begin, end])
+    centres = joint_centres(arm, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
+    offsets, tips = coordinates(arm, centres, directed=False), centres[:, -1]
+    return Intervals(tips[:1], tips[1:], offsets[:1], offsets[1:]), centres
+
+
+def far_off(centres: FloatArray, _axes: object = None, /) -> FloatArray:
+    return np.full((len(centres), centres.shape[1] - 1), 1.0)
+
+
+def test_a_start_near_a_wall_gives_own_bodies_nothing() -> None:
+    """What ways may lack towards obstacles, own bodies must keep all the same."""
+    problem = asked(1.0, 0.6, ErrorBox())
+    judge = Judge(problem, far_off, 0.0, 3e-4, 2e-3)
+    bent = np.zeros(17)
+    bent[7] = 0.72
+    into, _ = chart_lines(problem.manipulator, np.zeros(17), bent)
+    away, _ = chart_lines(problem.manipulator, np.zeros(17), -bent)
+    for lacking in (0.0, 0.01):
+        need = np.array([judge.required - lacking])
+        assert not judge.clear(into, need)[0]
+        assert judge.clear(away, need)[0]
+    assert judge.look(into.next_tips, into.next_offsets).clearances[0] == -np.inf
+    assert judge.look(away.next_tips, away.next_offsets).clearances[0] == 1.0
+
+
+def test_a_start_whose_own_bodies_lack_something_is_left() -> None:
+    """It stands as far apart as required, and not as far as errors may take."""
+    problem = asked(1.0, 0.6, ErrorBox())
+    arm, begin, nearer = problem.manipulator, np.zeros(17), np.zeros(17)
+    begin[7], nearer[7] = 0.6, 0.62
+    spare = problem.own_pairs.spare(begin[None, 1::2], begin[None, 2::2]).min()
+    assert 0.0 < spare < 0.01
+    path = replace(problem.path, start_joints=begin)
+    needs = spare + 1e-3
+    near = replace(problem, tip_path=path, required_self_clearance=needs)
+    judge = Judge(near, far_off, 0.0, 3e-4, 2e-3)
+    need = np.array([judge.required])
+    out, _ = chart_lines(arm, begin, np.zeros(17))
+    assert judge.clear(out, need)[0]
+    assert judge.look(out.tips, out.offsets).clearances[0] == 1.0
+    assert not judge.clear(chart_lines(arm, begin, nearer)[0], need)[0]
+    assert not judge.clear(chart_lines(arm, 0.99 * begin, np.zeros(17))[0], need)[0]
+
+
 def test_a_line_in_joint_space_is_clear_of_own_bodies() -> None:
     problem = asked(1.0, 0.6, ErrorBox())
-    far = lambda centres, _axes=None: np.full((len(centres), 8), 1.0)  # noqa: E731
     straight, bent = np.zeros(17), np.zeros(17)
     bent[7] = 0.72  # link 4 turns about z towards the camera on link 3
-    assert clear_line(problem, far, straight, bent, 0.0) is None
-    assert clear_line(problem, far, straight, -bent, 0.0) is not None
+    assert clear_line(problem, far_off, straight, bent, 0.0) is None
+    assert clear_line(problem, far_off, straight, -bent, 0.0) is not None

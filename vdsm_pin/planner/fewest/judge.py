@@ -26,13 +26,16 @@ CUTS: Final = 16
 """Times an interval is cut; the body moves 65,536 times less in what is left then."""
 NEAR_LIMIT: Final = 0.9
 """An interval is looked at for its link angles if an end has so much of the largest."""
-AIM_SHARES: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
-"""Parts of an interval at which it is seen where the last link looks; [-]."""
+SHARES: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+"""Places of an interval at which it is seen where the last link looks and whether the
+base is on its rail; [-]."""
 STEPS: Final = tuple(0.5 ** (2 + k) for k in range(10))
 """Steps to the place of an interval where a link bends most, one after the other; [-].
 """
 STEADY: Final = 2e-4
 """More of its cone that is kept in reserve; [rad]."""
+BLOCK: Final = 512
+"""Intervals judged at once, which bounds the memory for their parts."""
 THIRDS: Final = 40
 """Times the place where the base is farthest back is looked for in two thirds."""
 
@@ -128,7 +131,7 @@ class Judge:
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
         self.limit = ease * link_limit(problem)
-        self.own = OwnClearance(problem, slack)
+        self.own = OwnClearance(problem, slack, finest)
         self.cone = _cone(problem, slack)
 
     def lines(self, corners: Corners, intervals: IntArray) -> Intervals:
@@ -167,8 +170,7 @@ class Judge:
             clearances[~self._aimed(centres, aims)] = -np.inf
         angles = bends_of(centres)
         least = clearances.min(axis=1)
-        lacks = self.own.lacking(centres, angles)
-        least = np.where(lacks > 0.0, np.minimum(least, self.required - lacks), least)
+        least[self.own.too_near(centres, angles)] = -np.inf
         changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
         return Looks(least, changed, angles.max(axis=1))
 
@@ -270,12 +272,24 @@ class Judge:
         Returns:
             Shape (n,) each; the clearance is -inf where a limit is broken; [m].
         """
-        count, tol = len(intervals.tips), TOLERANCES.on_boundary
-        ask = self.clearance
+        count = len(intervals.tips)
         need = np.full(count, self.required) if required is None else required
         most = np.full(count, self.limit)
         if bend is not None:
-            most = np.minimum(most, bend + tol)
+            most = np.minimum(most, bend + TOLERANCES.on_boundary)
+        found = [
+            self._measured(intervals.part(rows), need[rows], most[rows])
+            for rows in (slice(k, k + BLOCK) for k in range(0, max(count, 1), BLOCK))
+        ]
+        good, begin = (np.concatenate(both) for both in zip(*found, strict=True))
+        return good, begin
+
+    def _measured(
+        self, intervals: Intervals, need: FloatArray, most: FloatArray
+    ) -> tuple[BoolArray, FloatArray]:
+        """`measured` of a block, with the largest link angles in each interval."""
+        count, tol = len(intervals.tips), TOLERANCES.on_boundary
+        ask = self.clearance
         knees = self._cuts(intervals)
         long_way = LONG_TRAVEL * self.problem.manipulator.total_length
         number, low, high = np.arange(count), np.zeros(count), np.ones(count)
@@ -294,8 +308,7 @@ class Judge:
         good = (begin >= need - tol) & (r1.min(axis=1) >= need - tol)
         bends = np.maximum(bends_of(c0), bends_of(c1))
         good &= self._within(intervals, (c0, c1), bends, most)
-        lacks = np.where(good, (self.required - need).clip(0.0), np.inf)
-        good &= self.own.apart(intervals, (c0, c1), bends, lacks)
+        good &= self.own.apart(intervals, (c0, c1), bends, good)
         parts = Parts(number, low, high, c0, c1, r0, r1)
         for _ in range(CUTS):
             counts = parts_of_pieces(parts, knees, need, self.finest, long_way)
@@ -343,7 +356,9 @@ class Judge:
         kept &= self._looking(intervals)
         ahead = np.minimum(ends[0][:, -1, 0], ends[1][:, -1, 0])
         near = np.flatnonzero(kept & (ahead - arm.total_length < arm.base_range[0]))
-        if near.size:
+        if near.size and intervals.directed:
+            kept[near] = self._on_rail(intervals, near)
+        elif near.size:
             least = arm.base_range[0] - TOLERANCES.planned_limit
             kept[near] = self._farthest_back(intervals, near) >= least
         return kept
@@ -379,9 +394,20 @@ class Judge:
         asked = np.flatnonzero(np.isfinite(intervals.aims).all(axis=(1, 2)))
         begin, end = intervals.aims[asked, 0], intervals.aims[asked, 1]
         arm = self.problem.manipulator
-        for share in AIM_SHARES if asked.size else ():
+        for share in SHARES if asked.size else ():
             inner = intervals.centres(arm, asked, np.full(len(asked), share))
             kept[asked] &= self._aimed(inner, (1.0 - share) * begin + share * end)
+        return kept
+
+    def _on_rail(self, intervals: Intervals, number: IntArray) -> BoolArray:
+        """Whether there is an arm at some places of intervals of directions, (r,).
+
+        Where there is none whose base is on its rail, joint centres are NaN.
+        """
+        arm, kept = self.problem.manipulator, np.ones(len(number), dtype=np.bool_)
+        for share in SHARES:
+            inner = intervals.centres(arm, number, np.full(len(number), share))
+            kept &= np.isfinite(inner).all(axis=(1, 2))
         return kept
 
     def _farthest_back(self, intervals: Intervals, number: IntArray) -> FloatArray:

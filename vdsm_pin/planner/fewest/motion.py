@@ -118,6 +118,17 @@ class Intervals:
             value = np.require(getattr(self, field.name), float, ["C", "W"])
             object.__setattr__(self, field.name, value)
 
+    def part(self, rows: slice) -> "Intervals":
+        """Some of them."""
+        aims = None if self.aims is None else self.aims[rows]
+        return Intervals(
+            self.tips[rows],
+            self.next_tips[rows],
+            self.offsets[rows],
+            self.next_offsets[rows],
+            aims,
+        )
+
     def knees(self, manipulator: Manipulator) -> BoolArray:
         """Joints where the arm may bend somewhere in each interval, and both ends.
 

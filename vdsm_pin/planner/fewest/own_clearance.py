@@ -11,12 +11,16 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
-CUTS: Final = 10
+CUTS: Final = 14
 """Times an interval is halved; what is not known to be apart then counts as too near.
 """
+FINE: Final = 0.1
+"""Part of the way of the body below which they count as apart between two places where
+they are; [-]."""
 SWELL: Final = 1.1
 """An arm may turn farther within an interval than at its ends, over these; [-]."""
 
@@ -35,39 +39,47 @@ class _Place(NamedTuple):
 class OwnClearance:
     """Looks at bodies of one arm that can come too near to each other.
 
+    Where the start has less than is kept, ways from it and to it need keep no more.
+
     Args:
-        problem: The arm.
+        problem: The arm, and where it starts.
         slack: Kept for what happens between two rows; where the straight arm has less
             than twice that to spare, half of what it has; [m].
+        finest: Way of the body below which intervals are not looked at; [m].
     """
 
-    def __init__(self, problem: PlanningProblem, slack: float) -> None:
+    def __init__(self, problem: PlanningProblem, slack: float, finest: float) -> None:
+        self.finest = FINE * finest
         self.arm, self.pairs = problem.manipulator, problem.own_pairs
         self.turn, straight = self.pairs.turn, np.zeros((1, self.arm.n_links))
+        self.start, self.lacked = start_centres(problem), np.zeros(len(self.pairs.kept))
         if self.turn < np.inf:
-            self.reserve = (self.pairs.spare(straight, straight)[0] / 2.0).clip(
-                0.0, slack
-            )
+            most = self.pairs.spare(straight, straight)[0] / 2.0
+            self.reserve = most.clip(0.0, slack)
+            if np.isfinite(self.start).all():
+                self.lacked = -self._at(self.start[None]).spare[0].clip(max=0.0)
 
-    def lacking(self, centres: FloatArray, bends: FloatArray) -> FloatArray:
-        """What postures lack of what their own bodies keep, shape (n,); [m].
+    def too_near(self, centres: FloatArray, bends: FloatArray) -> BoolArray:
+        """Postures whose own bodies are too near to each other, shape (n,).
 
         Args:
             centres: Joint centres, shape (n, N + 1, 3), NaN where a link is too short.
             bends: Link angles, shape (n, N), NaN there; [rad].
         """
-        lacks = np.zeros(len(centres))
+        found = np.zeros(len(centres), dtype=np.bool_)
         near = np.flatnonzero(bends.sum(axis=1) >= self.turn)
         if near.size:
-            lacks[near] = -self._at(centres[near]).spare.min(axis=1)
-        return lacks.clip(0.0)
+            spare = self._at(centres[near]).spare
+            lacked = self.lacked * self._starts(centres[near])[:, None]
+            found[near] = (spare + lacked < -TOLERANCES.on_boundary).any(axis=1)
+        return found
 
     def apart(
         self,
         intervals: Intervals,
         ends: tuple[FloatArray, FloatArray],
         bends: FloatArray,
-        allowed: FloatArray,
+        asked: BoolArray,
     ) -> BoolArray:
         """Which intervals keep own bodies apart all the way, shape (n,).
 
@@ -75,22 +87,24 @@ class OwnClearance:
             intervals: Straight lines in the chart.
             ends: Joint centres where they begin and end, shape (n, N + 1, 3); [m].
             bends: The larger link angles of both ends, shape (n, N); [rad].
-            allowed: What may lack, inf for anything, shape (n,); [m].
+            asked: Which of them are asked for, shape (n,).
         """
-        kept = np.ones(len(allowed), dtype=np.bool_)
-        turned = SWELL * bends.sum(axis=1) >= self.turn
-        number = np.flatnonzero(turned & np.isfinite(allowed))
+        kept = np.ones(len(asked), dtype=np.bool_)
+        number = np.flatnonzero(asked & (SWELL * bends.sum(axis=1) >= self.turn))
         if not number.size:
             return kept
         low, high = np.zeros(len(number)), np.ones(len(number))
         begin, end = (self._at(centres[number]) for centres in ends)
-        least = -allowed[:, None] - TOLERANCES.on_boundary
+        starts = self._starts(ends[0]) | self._starts(ends[1])
+        least = -self.lacked * starts[:, None] - TOLERANCES.on_boundary
         for _ in range(CUTS):
             need = least[number]
             near = ((begin.spare < need) | (end.spare < need)).any(axis=1)
             kept[number[near]] = False
             way = np.abs(end.alpha - begin.alpha) + np.abs(end.theta - begin.theta)
-            sure = begin.spare + end.spare >= way @ self.pairs.levers.T + 2.0 * need
+            moved = way @ self.pairs.levers.T
+            sure = begin.spare + end.spare >= moved + 2.0 * need
+            sure |= moved <= self.finest
             open_ = kept[number] & ~sure.all(axis=1)
             if not open_.any():
                 return kept
@@ -105,6 +119,13 @@ class OwnClearance:
             )
         kept[number] = False
         return kept
+
+    def _starts(self, centres: FloatArray) -> BoolArray:
+        """Which postures are the start that lacks something, shape (n,)."""
+        if not self.lacked.any():
+            return np.zeros(len(centres), dtype=np.bool_)
+        away = np.abs(centres - self.start).max(axis=(1, 2))
+        return np.asarray(away <= TOLERANCES.joint_centre)
 
     def _at(self, centres: FloatArray) -> _Place:
         """Postures, as bodies see them; one that is no arm lacks everything."""
