@@ -267,7 +267,7 @@ def test_gltf_moves_a_robot_s_links_as_pinocchio_does(
         times = np.arange(float(len(motion.q)))
         rates = np.gradient(motion.q, axis=0)
         motion = replace(motion, times=times, rates=rates)
-    drawing = RobotDrawing(cell, motion.path)
+    drawing = RobotDrawing(cell, motion)
     content, binary = opened(glb(drawing))
     model = pinocchio.buildModelFromUrdf(str(tmp_path / "cell" / "robot.urdf"))
     data, moments = model.createData(), drawing.told_moments()

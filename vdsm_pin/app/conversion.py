@@ -12,12 +12,12 @@ from vdsm_pin.app.workflow import TRAJECTORY
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.bags import check_topic, is_bag, read_bag, write_bag
-from vdsm_pin.io.trajectory_file import joint_names, read_trajectory, write_trajectory
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory, text_of
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory, joint_names
 from vdsm_pin.report.folder import check_outputs, staged
 from vdsm_pin.report.tables import write_cables, write_centres
 from vdsm_pin.robots.cell import Cell
@@ -102,7 +102,7 @@ def convert_to_folder(
         write_trajectory(staging / TRAJECTORY, motion)
         write_centres(staging / CENTRES, problem, motion)
         write_cables(staging / CABLES, problem, motion)
-        write_messages(staging, arm_message(motion), also)
+        write_messages(staging, motion.named, also)
     return motion
 
 
@@ -177,10 +177,3 @@ def read_arm_message(
         )
     except InvalidInput as error:
         raise InvalidFile(file=file, fault=str(error)) from None
-
-
-def arm_message(motion: Trajectory) -> JointTrajectory:
-    """A motion of the arm by the joints of its URDF: x0, alpha1, theta1, .."""
-    names = joint_names(motion.n_links)
-    times, rates, changes = motion.times, motion.rates, motion.changes
-    return JointTrajectory(names, motion.joints, times, rates, changes)

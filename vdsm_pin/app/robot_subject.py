@@ -55,7 +55,7 @@ class RobotSubject:
 
     def drawing(self, motion: JointTrajectory) -> RobotDrawing:
         """How a motion looks."""
-        return RobotDrawing(self.problem, motion.path)
+        return RobotDrawing(self.problem, motion)
 
     def checked(self, motion: object) -> JointTrajectory:
         """The motion with its columns in the robot's order, if it has its joints."""

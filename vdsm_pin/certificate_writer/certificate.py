@@ -32,7 +32,6 @@ from vdsm_pin.certificate_writer.schema import (
     RobotErrors,
     RobotHeaderLine,
 )
-from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.parts import PartPlan
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -114,7 +113,7 @@ def _of_robot(
         units[joint.unit][joint.name] = error
     return RobotHeaderLine(
         **told,
-        interpolation=JOINED[path.degree],
+        interpolation=verification.trajectory.interpolation,
         errors=RobotErrors(
             joints_rad=units["rad"], joints_m=units["m"], **_errors_beside(motion)
         ),

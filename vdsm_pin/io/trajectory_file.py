@@ -25,7 +25,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.source import check_is_file, readable
 from vdsm_pin.io.tables import CHUNK_ROWS, Table, open_text
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory, joint_names
 from vdsm_pin.tolerances import TOLERANCES
 
 WAYPOINT: Final = "waypoint"
@@ -91,12 +91,6 @@ by their accelerations too; or whichever the file has columns for."""
 TIME: Final = "time_s"
 X0: Final = "x0_m"
 _JOINT: Final = re.compile(r"(alpha|theta)[0-9]+_rad")
-
-
-def joint_names(n_links: int) -> tuple[str, ...]:
-    """Names of the joints of an arm of N links, as in its URDF: x0, alpha1, .."""
-    pairs = ((f"alpha{i}", f"theta{i}") for i in range(1, n_links + 1))
-    return ("x0", *(name for pair in pairs for name in pair))
 
 
 def column_names(n_links: int) -> tuple[str, ...]:

@@ -1,22 +1,18 @@
 """A trajectory of named joints, of any robot."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import BoolArray, ByValue, FloatArray, freeze
-from vdsm_pin.notebook import Summarised
-
-if TYPE_CHECKING:
-    from vdsm_pin.proof.paths import Path
+from vdsm_pin.geometry.arrays import FloatArray, freeze
+from vdsm_pin.problem.any_problem import BETWEEN, AnyMotion
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JointTrajectory(Summarised, ByValue):
+class JointTrajectory(AnyMotion):
     """Waypoints of named joints.
 
     Straight lines join them; cubic pieces where there are times and rates, and quintic
@@ -48,10 +44,11 @@ class JointTrajectory(Summarised, ByValue):
     changes: FloatArray | None = None
     notes: tuple[str, ...] = ()
     in_degrees: tuple[str, ...] = ()
+    OF_ROWS: ClassVar = ("q", *BETWEEN)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
-        freeze(self, "q", "times", "rates", "changes")
+        freeze(self, *self.OF_ROWS)
         object.__setattr__(self, "names", tuple(self.names))
         names, q = self.names, self.q
         if q.ndim != 2 or not len(q) or q.shape[1] != len(names):
@@ -69,12 +66,7 @@ class JointTrajectory(Summarised, ByValue):
             found = f"joint {names[k]!r} is {q[row, k]} at waypoint {row}"
             message = f"{found}, expected a finite number"
             raise InvalidInput(message)
-        shapes = {"times": q.shape[:1], "rates": q.shape, "changes": q.shape}
-        for name, shape in shapes.items():
-            values = getattr(self, name)
-            if values is not None and values.shape != shape:
-                message = f"{name} have shape {values.shape}, expected {shape}"
-                raise InvalidInput(message)
+        self.check_between(q.shape)
         self._check_smooth()
 
     def _check_smooth(self) -> None:
@@ -96,26 +88,10 @@ class JointTrajectory(Summarised, ByValue):
                 message = f"has {what}, expected {lacks} too"
                 raise InvalidInput(message)
 
-    @cached_property
-    def path(self) -> "Path":
-        """The pieces through the waypoints.
-
-        Raises:
-            ValueError: If times do not rise, or a value is not finite.
-        """
-        # Whoever reads waypoints alone needs no pieces.
-        from vdsm_pin.proof.paths import Path
-
-        return Path.through(self.q, self.times, self.rates, self.changes)
-
     @property
-    def n_samples(self) -> int:
-        """Number of waypoints."""
-        return len(self.q)
-
-    def times_at(self, moments: FloatArray) -> FloatArray | None:
-        """Times of moments in waypoints, shape (m,); [s]. None where not known."""
-        return self.path.times_at(moments)
+    def joints(self) -> FloatArray:
+        """All joint values, `q`."""
+        return self.q
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Its joints, its size and its time."""
@@ -140,9 +116,3 @@ class JointTrajectory(Summarised, ByValue):
             changes,
             in_degrees=tuple(name for name in names if name in self.in_degrees),
         )
-
-    def only(self, rows: BoolArray) -> "JointTrajectory":
-        """Some of its waypoints, shape (n_rows,)."""
-        parts = {name: getattr(self, name) for name in ("times", "rates", "changes")}
-        kept = {name: part[rows] for name, part in parts.items() if part is not None}
-        return replace(self, q=self.q[rows], **kept)

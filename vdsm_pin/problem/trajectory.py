@@ -1,34 +1,23 @@
 """A trajectory: rows of joint values, joined by straight lines or by smooth pieces."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+from typing import ClassVar, Final
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import (
     BoolArray,
-    ByValue,
     FloatArray,
     freeze,
     frozen,
     same_arrays,
 )
-from vdsm_pin.geometry.bernstein import derivative, value
-from vdsm_pin.notebook import Summarised
+from vdsm_pin.problem.any_problem import BETWEEN, AnyMotion
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
-
-if TYPE_CHECKING:
-    from vdsm_pin.proof.paths import Path
-
-Joined: TypeAlias = Literal["linear", "cubic", "quintic"]
-"""What joins the rows of a motion."""
-
-JOINED: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
-"""The same by the degree of the pieces."""
 
 MAX_ROWS: Final = 5_000_000
 """Largest number of rows of one trajectory."""
@@ -36,12 +25,15 @@ MAX_ROWS: Final = 5_000_000
 NUMBERS: Final = ("path_m", "x0", "alpha", "theta")
 """Fields of a trajectory that hold numbers of every row."""
 
-BETWEEN: Final = ("times", "rates", "changes")
-"""Those that tell what lies between them; None where not known."""
+
+def joint_names(n_links: int) -> tuple[str, ...]:
+    """Names of the joints of an arm of N links, as in its URDF: x0, alpha1, .."""
+    pairs = ((f"alpha{i}", f"theta{i}") for i in range(1, n_links + 1))
+    return ("x0", *(name for pair in pairs for name in pair))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Summarised, ByValue):
+class Trajectory(AnyMotion):
     """What a planner hands over and a verifier judges.
 
     Args:
@@ -72,6 +64,7 @@ class Trajectory(Summarised, ByValue):
     times: FloatArray | None = None
     rates: FloatArray | None = None
     changes: FloatArray | None = None
+    OF_ROWS: ClassVar = ("on_path", *NUMBERS, *BETWEEN)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
@@ -90,32 +83,15 @@ class Trajectory(Summarised, ByValue):
         ):
             message = f"trajectory arrays disagree: x0 {self.x0.shape}, alpha {shape}"
             raise InvalidInput(message)
-        for name in NUMBERS:
-            if not np.isfinite(getattr(self, name)).all():
+        self.check_between((n, 1 + 2 * self.n_links))
+        for name in (*NUMBERS, *BETWEEN):
+            values = getattr(self, name)
+            if values is not None and not np.isfinite(values).all():
                 message = f"trajectory has a value of {name} that is not finite"
                 raise InvalidInput(message)
         if not (np.abs(self.path_m) <= TOLERANCES.path_extent).all():
             message = f"trajectory has a path_m beyond {TOLERANCES.path_extent:g} m"
             raise InvalidInput(message)
-        self._check_motion()
-
-    def _check_motion(self) -> None:
-        """Check what is known of the motion between the rows.
-
-        Raises:
-            InvalidInput: If it does not fit the rows.
-        """
-        n, width = self.n_samples, 1 + 2 * self.n_links
-        shapes = {"times": (n,), "rates": (n, width), "changes": (n, width)}
-        for name, shape in shapes.items():
-            if (values := getattr(self, name)) is None:
-                continue
-            if values.shape != shape or not np.isfinite(values).all():
-                message = (
-                    f"trajectory has {name} of shape {values.shape}, expected {shape}, "
-                    "all of them finite"
-                )
-                raise InvalidInput(message)
         if self.times is not None and not (np.diff(self.times) > 0.0).all():
             message = "trajectory has times that do not rise from row to row"
             raise InvalidInput(message)
@@ -156,11 +132,6 @@ class Trajectory(Summarised, ByValue):
         )
 
     @property
-    def n_samples(self) -> int:
-        """Number of rows."""
-        return int(self.x0.size)
-
-    @property
     def n_links(self) -> int:
         """Number of links N."""
         return int(self.alpha.shape[1])
@@ -171,14 +142,14 @@ class Trajectory(Summarised, ByValue):
 
         Metres in the first column, radians in the others.
         """
-        rows = np.zeros((self.n_samples, 1 + 2 * self.n_links))
+        rows = np.zeros((len(self.x0), 1 + 2 * self.n_links))
         rows[:, 0], rows[:, 1::2], rows[:, 2::2] = self.x0, self.alpha, self.theta
         rows.setflags(write=False)
         return rows
 
     def same_as(self, other: "Trajectory") -> bool:
         """Whether all numbers are the same; notes do not count."""
-        return same_arrays(self, other, ("on_path", *NUMBERS, *BETWEEN))
+        return same_arrays(self, other, self.OF_ROWS)
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Its size and what it moves."""
@@ -192,39 +163,14 @@ class Trajectory(Summarised, ByValue):
         )
 
     @property
-    def is_smooth(self) -> bool:
-        """Whether smooth pieces join the rows, not straight lines."""
-        return self.rates is not None and self.n_samples > 1
-
-    @property
-    def interpolation(self) -> Joined:
-        """What joins the rows: linear, cubic or quintic pieces."""
-        if self.rates is None:
-            return "linear"
-        return "cubic" if self.changes is None else "quintic"
-
-    @cached_property
-    def path(self) -> "Path":
-        """How `joints` move: the rows and what joins them."""
-        from vdsm_pin.proof.paths import Path  # compiled code, which few need
-
-        return Path.through(self.joints, self.times, self.rates, self.changes)
+    def named(self) -> JointTrajectory:
+        """The same rows by the joints of the arm's URDF: x0, alpha1, theta1, .."""
+        names, between = joint_names(self.n_links), (self.rates, self.changes)
+        return JointTrajectory(names, self.joints, self.times, *between)
 
     def part(self, first: int, last: int) -> "Trajectory":
         """The rows from `first` up to `last`, or to the end where there are fewer."""
-        rows = slice(first, last)
-        return Trajectory.of_joints(
-            self.joints[rows],
-            self.on_path[rows],
-            self.path_m[rows],
-            None if self.times is None else self.times[rows],
-            None if self.rates is None else self.rates[rows],
-            None if self.changes is None else self.changes[rows],
-        )
-
-    def times_at(self, moments: FloatArray) -> FloatArray | None:
-        """Times of moments in waypoints, shape (m,); [s]. None where not known."""
-        return self.path.times_at(moments)
+        return self.only(slice(first, last))
 
     def at(self, moments: FloatArray) -> "Trajectory":
         """Rows at moments in waypoints, shape (m,); with times where those rise."""
@@ -238,7 +184,7 @@ class Trajectory(Summarised, ByValue):
 
     def refined(self, parts: int) -> "Trajectory":
         """The same smooth motion with every piece cut into so many equal ones."""
-        if self.rates is None or self.times is None or self.n_samples == 1:
+        if not self.is_smooth:
             return self
         k, share = np.divmod(np.arange((self.n_samples - 1) * parts + 1), parts)
         after = np.minimum(k + 1, self.n_samples - 1)
@@ -246,11 +192,7 @@ class Trajectory(Summarised, ByValue):
         on_path = self.on_path[k] & (self.on_path[after] | (share == 0))
         share = share / parts
         path_m = self.path_m[k] + share * (self.path_m[after] - self.path_m[k])
-        rows = self.path.at_moments(k + share), on_path, path_m
+        joints, times = self.path.at_moments(k + share), self.times_at(k + share)
         k, share[-1] = np.minimum(k, self.n_samples - 2), 1.0
-        step, once = np.diff(self.times)[k, None], derivative(self.path.pieces(k))
-        rates, changes = value(once, share) / step, None
-        if self.changes is not None:
-            changes = value(derivative(once), share) / step**2
-        times = np.interp(k + share, np.arange(self.n_samples), self.times)
-        return Trajectory.of_joints(*rows, times, rates, changes)
+        between = self.between(k, share)
+        return Trajectory.of_joints(joints, on_path, path_m, times, *between)

@@ -95,10 +95,10 @@ class _Motion:
         slopes, problem, at = self.slopes, self.slopes.problem, self.moments
         at, width = places.through(at), self.rows.joints.shape[1]
         origins, rows = on_curve(
-            _named(self.given),
+            self.given.named,
             at,
             self.origins.at(places),
-            sampled(_named(self.rows), places),
+            sampled(self.rows.named, places),
         )
         assert rows.times is not None
         spots = _spots(problem, self.rows, places, rows.q)
@@ -174,12 +174,6 @@ def _parts(problem: PlanningProblem, rows: Trajectory) -> IntArray:
         fine = np.ceil(np.sqrt(off_chord / (CHORD * problem.path.spacing)))
         parts = np.where(rows.on_path[:-1], np.maximum(parts, fine), parts)
     return np.asarray(parts, np.int64)
-
-
-def _named(rows: Trajectory) -> JointTrajectory:
-    """Joint values and what joins them, by any names."""
-    names = tuple(map(str, range(rows.joints.shape[1])))
-    return JointTrajectory(names, rows.joints, rows.times, rows.rates, rows.changes)
 
 
 def _spots(

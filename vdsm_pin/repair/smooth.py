@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.geometry.bernstein import derivative, value
+from vdsm_pin.geometry.bernstein import value
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.repair.rounds import Origins, Places
 
@@ -24,19 +24,17 @@ ROUNDED: Final = 1e-12
 def sampled(motion: JointTrajectory, places: Places) -> JointTrajectory:
     """The same motion with waypoints at some places, exact where they are rows."""
     times = None if motion.times is None else places.through(motion.times)
-    if motion.times is None or motion.rates is None:
+    if not motion.is_smooth:
         return replace(motion, q=places.through(motion.q), times=times)
     row, old = places.row, places.old[:, None]
     k = np.minimum(row, motion.path.n_intervals - 1)
-    share, step = places.moments - k, np.diff(motion.times)[k, None]
-    controls = motion.path.pieces(k)
-    q = np.where(old, motion.q[row], value(controls, share))
-    rates = value(derivative(controls), share) / step
-    rates = np.where(old, motion.rates[row], rates)
-    changes = motion.changes
-    if changes is not None:
-        between = value(derivative(derivative(controls)), share) / step**2
-        changes = np.where(old, changes[row], between)
+    share = places.moments - k
+    q = np.where(old, motion.q[row], value(motion.path.pieces(k), share))
+    pairs = zip((motion.rates, motion.changes), motion.between(k, share), strict=True)
+    rates, changes = (
+        None if given is None or inner is None else np.where(old, given[row], inner)
+        for given, inner in pairs
+    )
     return replace(motion, q=q, times=times, rates=rates, changes=changes)
 
 

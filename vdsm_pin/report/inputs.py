@@ -75,7 +75,7 @@ def _pieces(trajectory: Trajectory) -> tuple[str, ...]:
     """What joins the rows, where it is not straight lines."""
     if not trajectory.is_smooth:
         return ()
-    kind = "cubic" if trajectory.changes is None else "quintic"
+    kind = trajectory.interpolation
     more = "" if trajectory.changes is None else " and accelerations"
     text = f"{kind} pieces join the waypoints, by their velocities{more}: the curve is "
     return (text + "judged, not its chords",)

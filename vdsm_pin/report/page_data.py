@@ -34,7 +34,7 @@ def drawing_of(verification: Verification) -> Drawing:
     from vdsm_pin.robots.judgement import RobotVerification
 
     assert isinstance(verification, RobotVerification)
-    return RobotDrawing(verification.problem, verification.trajectory.path)
+    return RobotDrawing(verification.problem, verification.trajectory)
 
 
 def closest_data(

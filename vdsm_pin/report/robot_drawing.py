@@ -12,9 +12,9 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, quaternions
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.proof.bodies import Body
-from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.charts import packed, series
 from vdsm_pin.report.drawing import (
     DrawnPart,
@@ -44,7 +44,7 @@ class RobotDrawing:
     """How the motion of a robot of a URDF is drawn."""
 
     problem: Cell
-    trajectory: Path
+    trajectory: JointTrajectory
 
     @property
     def extent(self) -> float:
@@ -83,7 +83,7 @@ class RobotDrawing:
     def motion(self, shown: Thinned) -> dict[str, Any]:
         """Where the links are at moments, near enough to go straight in between."""
         moments = _moments(self.trajectory, shown)
-        places, turns = self._stances(self.trajectory.at_moments(moments))
+        places, turns = self._stances(self.trajectory.path.at_moments(moments))
         return {
             **row_data(self.trajectory, shown),
             "moments": packed(moments, "<f8"),
@@ -141,20 +141,20 @@ class RobotDrawing:
 
     def points(self, moments: FloatArray) -> FloatArray:
         """The links' middles at moments in waypoints, shape (n, n_links, 3); [m]."""
-        places, _ = self._frames(self.trajectory.at_moments(moments))
+        places, _ = self._frames(self.trajectory.path.at_moments(moments))
         return places.swapaxes(0, 1)
 
     def parts(self, moments: FloatArray) -> list[DrawnPart]:
         """The links at moments in waypoints."""
         looks = self.names, self._skins, link_colours(len(self.names))
-        rows = self._frames(self.trajectory.at_moments(moments))
+        rows = self._frames(self.trajectory.path.at_moments(moments))
         return [DrawnPart(*one) for one in zip(*looks, *rows, strict=True)]
 
     def charts(
         self, shown: Thinned, clearances: list[dict[str, Any]]
     ) -> list[dict[str, Any]]:
         """The clearances, the joints that turn, and those that slide."""
-        joints, q = self.problem.robot.joints, self.trajectory.knots[shown.rows]
+        joints, q = self.problem.robot.joints, self.trajectory.q[shown.rows]
         colours, charts = link_colours(len(joints)), list(clearances)
         for turns, name, unit, factor in (
             (True, "Joint angles", "°", np.degrees(1.0)),
@@ -180,13 +180,13 @@ class RobotDrawing:
         return charts
 
 
-def _moments(path: Path, shown: Thinned) -> FloatArray:
+def _moments(motion: JointTrajectory, shown: Thinned) -> FloatArray:
     rows = shown.rows.astype(np.float64)
     if len(rows) < 2:
         return rows
-    ways = np.abs(np.diff(path.knots[shown.rows], axis=0)).max(axis=1, initial=0.0)
+    ways = np.abs(np.diff(motion.q[shown.rows], axis=0)).max(axis=1, initial=0.0)
     most = max(1, _MOST // len(ways))
-    least = 1 if path.degree == 1 else min(_SMOOTH, most)
+    least = 1 if motion.path.degree == 1 else min(_SMOOTH, most)
     parts = np.ceil(ways / _STEP).clip(least, most).astype(int)
     return subdivided(rows, parts)
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem.trajectory import JOINED
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.facts import counterexample_row, error_box, left_out_rows
 from vdsm_pin.report.inputs import file_notes, longer_motions
@@ -35,7 +35,7 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
         "undrawn_m": (),
         "error_box": error_box(cell.errors),
         "left_out": left_out_rows(cell.robot.left_out),
-        "motion": _motion(cell, motion.path),
+        "motion": _motion(cell, motion),
         "counterexamples": tuple(
             counterexample_row(
                 verification, one, joints=_erring(cell.robot, one.joints, one.offsets)
@@ -45,17 +45,17 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
     }
 
 
-def _motion(cell: Cell, path: Path) -> RobotFacts:
+def _motion(cell: Cell, motion: JointTrajectory) -> RobotFacts:
     robot = cell.robot
     rows = (
         _joint(joint, values)
-        for joint, values in zip(robot.joints, reached(path).T, strict=True)
+        for joint, values in zip(robot.joints, reached(motion.path).T, strict=True)
     )
     return RobotFacts.model_validate(
         {
-            "waypoints": path.n_samples,
+            "waypoints": motion.n_samples,
             "robot": robot.name,
-            "interpolation": JOINED[path.degree],
+            "interpolation": motion.interpolation,
             "bodies": robot.solids.words,
             "links": tuple(body.name for body in robot.bodies),
             "joints": tuple(rows),

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from vdsm_pin.problem.trajectory import Joined
+from vdsm_pin.problem.any_problem import Joined
 from vdsm_pin.report.words import BASE_ERROR
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
