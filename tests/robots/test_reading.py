@@ -154,6 +154,19 @@ def test_another_element_of_a_collision_is_noted(tmp_path: Path) -> None:
     assert [note for note in notes if note.startswith("<pose> of links is not read: ")]
 
 
+@pytest.mark.parametrize("tag", ["origin", "geometry"])
+def test_what_places_or_shapes_nothing_inside_a_link_is_noted(
+    tmp_path: Path, tag: str
+) -> None:
+    """Exporters write an origin there; Pinocchio passes over it as well."""
+    text = URDF.replace("<collision>", f'<{tag} xyz="1 0 0"/><collision>', 1)
+    robot = read_robot(RobotFiles(write(tmp_path, "odd.urdf", text)))
+    plain = read_robot(RobotFiles(write(tmp_path, "plain.urdf", URDF)))
+    (note,) = set(robot.notes) - set(plain.notes)
+    assert note.startswith(f"<{tag}> directly inside links is not read: ")
+    assert pose_difference(robot, np.array([[0.7, 0.1]])).max() < 1e-12
+
+
 def test_prefixes_that_nothing_declares_are_read_as_ros_does(tmp_path: Path) -> None:
     """As in URDFs for Drake; `document.iter` sees them, Pinocchio the same joints."""
     text = URDF.replace("<limit ", '<limit drake:acceleration="2.5" ', 1)

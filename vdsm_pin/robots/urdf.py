@@ -89,6 +89,9 @@ def _not_judged(document: ET.Element) -> Iterator[str]:
                 having.setdefault(tag, []).append(one.get("name", ""))
         for tag, names in having.items():
             yield f"<{tag}> of {kind}s is not read: {listed(names)}"
+    for tag in ("origin", "geometry"):
+        if names := [one.get("name", "") for one in document.findall(f"link[{tag}]")]:
+            yield f"<{tag}> directly inside links is not read: {listed(names)}"
     words = (word for one in document.iter() for word in (one.tag, *one.attrib))
     spaces = {word[1:].partition("}")[0] for word in words if word.startswith("{")}
     if spaces:
