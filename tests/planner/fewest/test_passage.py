@@ -1,6 +1,7 @@
 """Proofs that no way leads to a tip, from both sides of what passes."""
 
 import itertools
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,7 @@ from scenes_for_fewest import problem, random_problem
 from some_slow import few_of
 
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.errors import CutOff
+from vdsm_pin.errors import CutOff, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.solids import Box, Sphere
@@ -22,14 +23,15 @@ from vdsm_pin.planner.fewest.levels import Effort, Insert, Search
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
-from vdsm_pin.planner.impossible.cut_off import cut_off
-from vdsm_pin.planner.impossible.octree import DEPTH, adjoining, places
+from vdsm_pin.planner.impossible.cut_off import CutOffProof, cut_off
+from vdsm_pin.planner.impossible.octree import DEPTH, Octree, adjoining, places
 from vdsm_pin.planner.upper_clearance import (
     nearest_bounds,
     upper_bounds,
     upper_bounds_to,
 )
 from vdsm_pin.problem.desired_path import Blocked
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 
 KEEP = built_in("hrm8").link_radius + 0.0035
@@ -116,6 +118,44 @@ def test_the_tip_of_a_plan_is_never_cut_off() -> None:
         assert not cut_off(task, tips).any()
 
 
+def once_more(halved: list[int]) -> Deadline:
+    """A deadline that passes as soon as there is one entry more."""
+    seen = len(halved)
+
+    class Once(Deadline):
+        @property
+        def passed(self) -> bool:
+            return len(halved) > seen
+
+    return Once()
+
+
+def test_a_proof_that_had_no_time_goes_on_from_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The time is over after each halving: it ends after as many, with the answer."""
+    centre = np.array([2.6, 0.5, 0.0])
+    task = problem(*cage(KEEP - 0.02, np.eye(3), centre), start=(1.8, 0.0, 0.0))
+    halved: list[int] = []
+    split = Octree.split
+
+    def counted(cells: Octree, chosen: IntArray) -> None:
+        split(cells, chosen)
+        halved.append(cells.codes.size)
+
+    monkeypatch.setattr(Octree, "split", counted)
+    tips = centre[None]
+    whole = cut_off(task, tips)
+    at_once, proof = halved.copy(), CutOffProof(task, tips)
+    halved.clear()
+    found = None
+    while found is None:
+        with suppress(OutOfTime):
+            found = proof.proved(once_more(halved))
+    assert whole.tolist() == found.tolist() == [True]
+    assert halved == at_once and len(halved) > 3
+
+
 def test_no_proof_is_tried_where_a_way_of_the_tip_is_known(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -125,7 +165,7 @@ def test_no_proof_is_tried_where_a_way_of_the_tip_is_known(
         asked.append(given)
         return np.zeros(len(path_rows(task.path).tips), dtype=np.bool_)
 
-    monkeypatch.setattr("vdsm_pin.planner.fewest.explore.cut_off", counted)
+    monkeypatch.setattr(CutOffProof, "proved", counted)
     centre = np.array([2.6, 0.5, 0.0])
     tips = centre + np.array([[0.2, 0.0, 0.0], [0.2, 0.1, 0.0]])
     for window, tries in ((KEEP + 0.02, 0), (KEEP - 0.02, 1)):

@@ -38,7 +38,7 @@ from vdsm_pin.planner.fewest.start_node import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips
-from vdsm_pin.planner.impossible.cut_off import cut_off
+from vdsm_pin.planner.impossible.cut_off import CutOffProof
 from vdsm_pin.planner.impossible.last_link import hemmed_in
 from vdsm_pin.planner.upper_clearance import TIP_ONLY, held_from, last_link
 from vdsm_pin.problem.desired_path import Blocked
@@ -67,8 +67,7 @@ FEW_KNEES: Final = 2.0
 """Mean number of knees of an insertion up to which no roadmap is asked for fewer."""
 
 PROOF_SHARE: Final = 0.1
-"""Part of the time left for a proof before it is put off until the searches end; [-].
-"""
+"""Part of the time left that a proof has after a level; [-]."""
 
 LOG: Final = logging.getLogger(__name__)
 
@@ -95,6 +94,12 @@ class Explored:
     def missing(self) -> float:
         """Length not drawn and not proved impossible; [m]."""
         return np.inf if self.found is None else self.found.missing
+
+    @property
+    def will_do(self) -> bool:
+        """Whether what has been found is a plan, though more might be found."""
+        whole = self.judge.problem.path.blocked is Blocked.FAIL
+        return self.found is not None and not (whole and self.missing > 0.0)
 
     @property
     def knees(self) -> float:
@@ -168,8 +173,7 @@ def explore(
     no_way_out: NoWayOut | None = None
     stuck: Stuck | None = None
     spaces = _Spaces(problem, clearance, margin)
-    proofs: list[Proving] = [_cut_off, _hemmed_in] if effort.proves else []
-    later: list[Proving] = []
+    proofs: list[Proving] = [_CutOff(best), _hemmed_in] if effort.proves else []
     levels, room = effort.levels, Room(0.0, 0.0)
     while levels:
         if best.found is None and room.confined:
@@ -185,10 +189,6 @@ def explore(
                 now = replace(now, found=found)
         except NoWayOut as error:
             no_way_out = error
-        except OutOfTime:
-            if not _will_do(best):
-                raise
-            return
         LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.beats(best):
             best = now
@@ -207,26 +207,19 @@ def explore(
             return
         if proofs and (level is first or isinstance(level, Insert)):
             # Seldom needed, so only now: can it be done at all?
-            prove, space = proofs.pop(0), spaces.of_first((level, *levels))
-            try:
-                best = prove(clearance.hurried(PROOF_SHARE), best, space)
-            except OutOfTime:
-                later.append(prove)
+            space = spaces.of_first((level, *levels))
+            with suppress(OutOfTime):  # it goes on after the next level
+                best = proofs[0](clearance.hurried(PROOF_SHARE), best, space)
+                proofs = proofs[1:]
             yield best
             proof = best.proof.take(best.rows.as_stated)
             if proof.undrawable.all():
                 return
-    for prove in later:
+    for prove in proofs[:1]:
         best = prove(clearance, best, None)
         yield best
     if best.found is None and stuck is None and no_way_out is not None:
         raise no_way_out
-
-
-def _will_do(outcome: Explored) -> bool:
-    """Whether what has been found is a plan, though more might be found."""
-    whole = outcome.judge.problem.path.blocked is Blocked.FAIL
-    return outcome.found is not None and not (whole and outcome.missing > 0.0)
 
 
 class Room(NamedTuple):
@@ -387,18 +380,23 @@ The ways of the tip that are known may show that there is nothing to prove.
 """
 
 
-def _cut_off(
-    clearance: BroadPhase, outcome: Explored, space: TipSpace | None
-) -> Explored:
-    """The outcome with rows that no way of the tip is proved to lead to.
+class _CutOff:
+    """Rows of a path that no way of the tip is proved to lead to.
 
     Where ways of the tip to all of them are soon found, there are none.
     """
-    if space and _leads_there(space, outcome):
-        return outcome
-    there, tips = held_from(outcome.judge.problem, TIP_ONLY), outcome.rows.tips
-    found = cut_off(there, tips, clearance.deadline)
-    return replace(outcome, proof=replace(outcome.proof, cut_off=found))
+
+    def __init__(self, before: Explored) -> None:
+        there = held_from(before.judge.problem, TIP_ONLY)
+        self._proof = CutOffProof(there, before.rows.tips)
+
+    def __call__(
+        self, clearance: BroadPhase, outcome: Explored, space: TipSpace | None
+    ) -> Explored:
+        if space and _leads_there(space, outcome):
+            return outcome
+        found = self._proof.proved(clearance.deadline)
+        return replace(outcome, proof=replace(outcome.proof, cut_off=found))
 
 
 def _hemmed_in(

@@ -6,6 +6,7 @@ look. For the other pieces the interval is cut into as many parts as that seems 
 This is a planner's check; the proof over continuous time is the verifier's.
 """
 
+from copy import copy
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.interval_parts import LONG_TRAVEL, Parts, parts_of_pieces
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.own_clearance import OwnClearance
@@ -20,6 +22,7 @@ from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pie
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import ANYWHERE, AimError, LastLinkCone
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
 CUTS: Final = 16
@@ -133,6 +136,14 @@ class Judge:
         self.limit = ease * link_limit(problem)
         self.own = OwnClearance(problem, slack, finest)
         self.cone = _cone(problem, slack)
+
+    def until(self, deadline: Deadline) -> "Judge":
+        """The same, which answers up to another time."""
+        other = copy(self)
+        for name in ("clearance", "rough"):
+            if isinstance(one := getattr(self, name), BroadPhase):
+                setattr(other, name, replace(one, deadline=deadline))
+        return other
 
     def lines(self, corners: Corners, intervals: IntArray) -> Intervals:
         """Some intervals of a motion, with where the last link shall look on the path.

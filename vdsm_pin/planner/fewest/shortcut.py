@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import compiled
+from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, distinct
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners
@@ -118,7 +119,10 @@ def shortcut(judge: Judge, corners: Corners, weights: CostWeights) -> Corners:
         for phase in (0, stride // 2):
             spans = _spans(corners, stride, phase)
             if spans:
-                corners, state = _round(judge, corners, state, weights, spans)
+                try:
+                    corners, state = _round(judge, corners, state, weights, spans)
+                except OutOfTime:
+                    return corners
     return corners
 
 

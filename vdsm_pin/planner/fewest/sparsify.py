@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray
 from vdsm_pin.planner.fewest.charts import coordinates, in_line
 from vdsm_pin.planner.fewest.judge import Judge
@@ -75,7 +76,10 @@ def _in_order(judge: Judge, motion: _Bent, joints: range) -> _Bent:
     """The motion with joints made straight in an order, until none can be."""
     steps, vain, fewest = [*itertools.product(joints, WAYS)], 0, motion.knees
     for joint, way in ROUNDS * steps:
-        corners = _without(judge, motion, joint, way)
+        try:
+            corners = _without(judge, motion, joint, way)
+        except OutOfTime:
+            break
         vain += 1
         if corners is not motion.corners:
             trial = _Bent.of(judge, corners)

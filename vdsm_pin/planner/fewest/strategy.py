@@ -191,24 +191,26 @@ class _Search:
                 best = outcome
                 say_drawn(problem, best)
                 refuse_proved(problem, best)
-            assert best is not None
-            refuse(problem, best)
-            return self._written(quick, best)
         except OutOfTime as ended:
-            reached = "" if best is None else how_far(problem, best, quick)
-            raise OutOfTime(ended.limit, reached) from None
+            if best is None or not best.will_do:
+                reached = "" if best is None else how_far(problem, best, quick)
+                raise OutOfTime(ended.limit, reached) from None
+        assert best is not None
+        refuse(problem, best)
+        return self._written(quick, best)
 
     def _written(self, clearance: BroadPhase, outcome: Explored) -> Plan:
         """What was found, smoothed and row by row."""
         assert outcome.found is not None
         problem, judge = self.problem, outcome.judge
-        arm, corners = problem.manipulator, self._smoothed(outcome)
+        arm, clearance = problem.manipulator, clearance.hurried(IMPROVE_SHARE)
+        corners = self._smoothed(clearance, outcome)
         turn = problem.planned_row_change
         rows = dense_rows(arm, corners, problem.path.spacing, turn, judge.slack)
         alpha, theta = joint_angles(arm, rows.centres)
         # Proofs of what is needed ask no more than whether there is the clearance
         # required.
-        enough = clearance.up_to(problem.required_clearance).hurried(IMPROVE_SHARE)
+        enough = clearance.up_to(problem.required_clearance)
         stations, on_path = _stations(corners, rows)
         trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
         return Plan(
@@ -220,10 +222,11 @@ class _Search:
             notes_of(problem, enough, outcome, trajectory, rows.centres),
         )
 
-    def _smoothed(self, outcome: Explored) -> Corners:
+    def _smoothed(self, clearance: BroadPhase, outcome: Explored) -> Corners:
         """What was found, shorter and with fewer knees, as far as there is time."""
         assert outcome.found is not None
-        judge, corners = outcome.judge, outcome.found.corners
+        judge = outcome.judge.until(clearance.deadline)
+        corners = outcome.found.corners
         grown = not isinstance(outcome.found, Searched)
         # What is straighter has more knees to spare. A roadmap has few but for an aim.
         pointing = self.problem.path.pointing is not None

@@ -140,40 +140,61 @@ def cut_off(
     tips: FloatArray,
     deadline: Deadline = NO_LIMIT,
 ) -> BoolArray:
-    """Which tips no way leads to from the start; proved, but not every such tip found.
+    """Which tips no way leads to from the start, see `CutOffProof`; shape (n,)."""
+    return CutOffProof(problem, tips).proved(deadline)
 
-    Cells are halved until every tip is reached or cut off, or there are too many.
+
+class CutOffProof:
+    """Which tips no way leads to from the start; proved, but not every such tip found.
 
     Args:
         problem: Arm, scene, start, required clearance.
         tips: Shape (n, 3); [m].
-        deadline: When to give up.
-
-    Returns:
-        Shape (n,).
-
-    Raises:
-        OutOfTime: If the time is over.
     """
-    cells = _Cells(problem, deadline)
-    while True:
-        deadline.check()
-        start_node, goals = cells.holders(problem.path.start[None]), cells.holders(tips)
-        if start_node[0] < 0:  # no arm stands there
-            return np.zeros(len(tips), dtype=np.bool_)
+
+    def __init__(self, problem: PlanningProblem, tips: FloatArray) -> None:
+        self.problem, self.tips = problem, tips
+        self._cells: _Cells | None = None
+
+    def proved(self, deadline: Deadline) -> BoolArray:
+        """Which tips are cut off, shape (n,); cells that are known are kept.
+
+        Cells are halved until every tip is reached or cut off, or there are too many.
+
+        Args:
+            deadline: When to stop; asked again the search goes on from there.
+
+        Raises:
+            OutOfTime: If the time is over.
+        """
+        if self._cells is None:
+            self._cells = _Cells(self.problem, deadline)
+        cells = self._cells
+        cells.deadline = deadline
+        while True:
+            deadline.check()
+            known, likely = self._looked(cells)
+            if not likely.size:
+                return known
+            cells.split(cells.closest(likely))
+
+    def _looked(self, cells: _Cells) -> tuple[BoolArray, IntArray]:
+        """Which tips are cut off by what is known, and the cells to halve next."""
+        start = cells.holders(self.problem.path.start[None])
+        if start[0] < 0:  # no arm stands there
+            return np.zeros(len(self.tips), dtype=np.bool_), start[:0]
+        goals = cells.holders(self.tips)
         # A cell whose centre is clear hardly ever ends a way.
         light = np.where(cells.middle < 0.0, 1.0, LIGHT)
         doubt = np.where(cells.state == DOUBTFUL, cells.sizes() * light, 0.0)
         first, neighbours = adjoining(cells.codes, cells.levels, cells.state != SHUT)
-        there = doubt_to(start_node, first, neighbours, doubt)
+        there = doubt_to(start, first, neighbours, doubt)
         need = np.where(goals >= 0, there[goals], 0.0)
-        closed = ~np.isfinite(need)
+        closed = np.asarray(~np.isfinite(need))
         open_ = distinct(goals[(need > 0.0) & ~closed])
         if not open_.size or cells.codes.size > MOST_CELLS:
-            return np.asarray(closed)
+            return closed, open_[:0]
         through = there + doubt_to(open_, first, neighbours, doubt) - doubt
         good = (cells.state == DOUBTFUL) & (cells.levels < DEPTH)
         good &= through <= DETOUR * float(there[open_].min())
-        if not good.any():
-            return np.asarray(closed)
-        cells.split(cells.closest(np.flatnonzero(good)))
+        return closed, np.flatnonzero(good)
