@@ -17,7 +17,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.repair.rounds import APART, Origins, Places, Repaired, repaired
+from vdsm_pin.repair.rounds import Origins, Places, Repaired, parts_of, repaired
 from vdsm_pin.repair.slopes import Slopes, joint_scale
 from vdsm_pin.repair.smooth import bulged, on_curve, sampled
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -60,11 +60,6 @@ class _Motion:
     origins: Origins
     given: Trajectory
     moments: FloatArray
-
-    @property
-    def q(self) -> FloatArray:
-        """Its joint values, shape (n_rows, 1 + 2N)."""
-        return self.rows.joints
 
     def pushed(self, margins: dict[int, float], moments: FloatArray) -> "_Motion":
         """The motion sampled closely, its pairs pushed apart by margins; [m]."""
@@ -166,14 +161,13 @@ def repair_arm(
 
 def _parts(problem: PlanningProblem, rows: Trajectory) -> IntArray:
     """Into how many parts to sample each interval, shape (n_rows - 1,)."""
-    steps = np.abs(np.diff(rows.path.controls, axis=1)).sum(axis=1)
-    steps *= joint_scale(problem.manipulator)
-    parts = np.maximum(1.0, np.ceil(steps.max(axis=1, initial=0.0) / APART))
+    parts = parts_of(rows, joint_scale(problem.manipulator))
     if problem.tip_path is not None:
         off_chord = second_derivatives(problem.manipulator, rows) / 8.0
         fine = np.ceil(np.sqrt(off_chord / (CHORD * problem.path.spacing)))
-        parts = np.where(rows.on_path[:-1], np.maximum(parts, fine), parts)
-    return np.asarray(parts, np.int64)
+        fine = np.maximum(parts, fine).astype(np.int64)
+        parts = np.where(rows.on_path[:-1], fine, parts)
+    return parts
 
 
 def _spots(

@@ -9,7 +9,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
-from vdsm_pin.repair.rounds import APART, Origins, Places, Repaired, repaired
+from vdsm_pin.repair.rounds import Origins, Places, Repaired, parts_of, repaired
 from vdsm_pin.repair.smooth import bulged, on_curve, sampled
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
@@ -47,17 +47,9 @@ class _Motion:
     moments: FloatArray
     origins: Origins
 
-    @property
-    def q(self) -> FloatArray:
-        """Its waypoints, shape (n_rows, n_columns); [rad], [m]."""
-        return self.rows.q
-
     def pushed(self, margins: dict[int, float], moments: FloatArray) -> "_Motion":
         """The motion sampled closely, its pairs pushed apart by margins; [m]."""
-        steps = np.abs(np.diff(self.rows.path.controls, axis=1)).sum(axis=1)
-        parts = np.ceil(steps.max(axis=1, initial=0.0) / APART)
-        counts = np.maximum(1.0, parts).astype(np.int64)
-        places = Places.within(counts, moments, self.rows.times)
+        places = Places.within(parts_of(self.rows), moments, self.rows.times)
         origins, at = self.origins.at(places), places.through(self.moments)
         rows = sampled(self.rows, places)
         if rows.rates is not None:

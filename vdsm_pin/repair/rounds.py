@@ -15,15 +15,14 @@ import numpy as np
 from vdsm_pin.errors import Infeasible, InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.notebook import Summarised
-from vdsm_pin.problem.joint_trajectory import JointTrajectory
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.problem.any_problem import AnyMotion
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import MM_PER_M, in_mm
 from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.records import Verdict, Verification
 
-R = TypeVar("R", bound=Trajectory | JointTrajectory)
+R = TypeVar("R", bound=AnyMotion)
 V = TypeVar("V", bound=Verification)
 
 ROUNDS: Final = 12
@@ -74,6 +73,18 @@ class Repaired(Summarised, Generic[R, V]):
             ("moved most", self.most),
             *self.verification.summary(),
         )
+
+
+def parts_of(motion: AnyMotion, scale: FloatArray | float = 1.0) -> IntArray:
+    """Into how many parts to sample each interval, shape (n_rows - 1,).
+
+    Args:
+        motion: Its rows and what joins them.
+        scale: Makes its columns comparable, shape (n_columns,).
+    """
+    steps = scale * np.abs(np.diff(motion.path.controls, axis=1)).sum(axis=1)
+    parts = np.ceil(steps.max(axis=1, initial=0.0) / APART)
+    return np.asarray(np.maximum(1.0, parts), np.int64)
 
 
 @dataclass(frozen=True)
@@ -220,13 +231,8 @@ class Pushed(Protocol):
     """A motion on its way to be certified."""
 
     @property
-    def rows(self) -> Trajectory | JointTrajectory:
+    def rows(self) -> AnyMotion:
         """The motion now."""
-        ...
-
-    @property
-    def q(self) -> FloatArray:
-        """Its joint values, shape (n_rows, n_columns)."""
         ...
 
     @property
@@ -288,7 +294,7 @@ def repaired(
     if found.verdict is not Verdict.CERTIFIED:
         deadline.check()  # else what was not judged in time would be the reason
         raise Infeasible(_why(found))
-    moved = np.abs(motion.q - motion.origins.base).max(axis=1, initial=0.0)
+    moved = np.abs(motion.rows.joints - motion.origins.base).max(axis=1, initial=0.0)
     return Repaired(motion.rows, found, motion.origins.given, moved)
 
 
