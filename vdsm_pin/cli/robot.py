@@ -131,13 +131,13 @@ class RobotOptions(NamedTuple):
 
         assert self.urdf is not None
         return RobotFiles(
-            self.urdf,
-            self.srdf,
-            tuple(self.package_dir or ()),
-            locks(tuple(self.lock or ())),
-            self.group,
-            solids_of(self.bodies, self.parts),
-            self.joint_limits,
+            urdf=self.urdf,
+            srdf=self.srdf,
+            package_dirs=tuple(self.package_dir or ()),
+            lock=locks(tuple(self.lock or ())),
+            group=self.group,
+            solids=solids_of(self.bodies, self.parts),
+            joint_limits=self.joint_limits,
         )
 
     def named(self) -> dict[str, object]:

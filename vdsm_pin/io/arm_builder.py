@@ -70,13 +70,13 @@ class ArmBuilder(Builder):
         assert rail and cables  # what is None was raised
         with self.document.naming(self.at):
             return Manipulator(
-                model.name,
-                lengths,
-                float(radii.max()),
-                float(radians(model.max_link_angle_deg)),
-                float(radians(model.max_joint_angle_deg)),
-                rail,
-                cables,
+                name=model.name,
+                link_lengths=lengths,
+                link_radius=float(radii.max()),
+                max_link_angle=float(radians(model.max_link_angle_deg)),
+                max_joint_angle=float(radians(model.max_joint_angle_deg)),
+                base_range=rail,
+                cables=cables,
                 radii=radii if isinstance(model.link_radius, list) else None,
                 tool=tool,
                 feed=self._feed(model, float(radii[0])),
@@ -142,13 +142,13 @@ class ArmBuilder(Builder):
         lengths = (unit * found.link_lengths).tolist()
         with self.document.naming((*self.at, "urdf")):
             return Manipulator(
-                found.name,
-                found.link_lengths,
-                found.link_radius,
-                float(radians(model.max_link_angle_deg)),
-                found.max_joint_angle,
-                found.base_range,
-                self._cables(model.cables, lengths, unit * found.link_radius),
+                name=found.name,
+                link_lengths=found.link_lengths,
+                link_radius=found.link_radius,
+                max_link_angle=float(radians(model.max_link_angle_deg)),
+                max_joint_angle=found.max_joint_angle,
+                base_range=found.base_range,
+                cables=self._cables(model.cables, lengths, unit * found.link_radius),
             )
 
     def _check_extent(self, length: float, stroke: float) -> None:

@@ -126,8 +126,15 @@ class OtherReader(Builder):
             if self.read_robot is None:
                 fault = "is of a URDF, which is not read here"
                 raise self.document.invalid((*at, "robot"), fault)
-            more = file, model.topic, frozen(pose)
-            return self.read_robot(OtherFile(model.name, model.robot, folder, *more))
+            other = OtherFile(
+                name=model.name,
+                model=model.robot,
+                folder=folder,
+                trajectory=file,
+                topic=model.topic,
+                pose=frozen(pose),
+            )
+            return self.read_robot(other)
         if model.manipulator is None or model.robot is not None:
             fault = "has both or none of manipulator and robot, expected one of them"
             raise self.document.invalid(at, fault)

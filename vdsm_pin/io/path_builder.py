@@ -86,19 +86,19 @@ class PathBuilder(PostureBuilder):
         assert start and points is not None and insertion is not None  # else raised
         home = model.retreat == "home"
         path = DesiredPath(
-            start.tip,
-            without_repeats(points, closed=model.closed),
-            model.closed,
-            spacing_of(model, self.frame),
-            Approach(model.approach),
-            0.0 if home else float(self.frame.metres(model.retreat)),
-            Blocked(model.blocked),
-            model.required_coverage,
-            start.joints,
-            Order(model.order),
-            pointing,
-            home,
-            insertion,
+            start=start.tip,
+            points=without_repeats(points, closed=model.closed),
+            closed=model.closed,
+            spacing=spacing_of(model, self.frame),
+            approach=Approach(model.approach),
+            retreat=0.0 if home else float(self.frame.metres(model.retreat)),
+            blocked=Blocked(model.blocked),
+            required_coverage=model.required_coverage,
+            start_joints=start.joints,
+            order=Order(model.order),
+            pointing=pointing,
+            home=home,
+            insertion=insertion,
         )
         self._check_rows(path)
         return path

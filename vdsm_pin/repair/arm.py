@@ -78,9 +78,9 @@ class _Motion:
         kept = origins.kept(rows.joints, bad)
         moved = Trajectory.of_joints(
             whole[kept, : rows.joints.shape[1]],
-            rows.on_path[kept],
-            rows.path_m[kept],
-            None if rows.times is None else rows.times[kept],
+            on_path=rows.on_path[kept],
+            path_m=rows.path_m[kept],
+            times=None if rows.times is None else rows.times[kept],
         )
         at = places.through(self.moments)[kept]
         return replace(self, rows=moved, origins=origins.only(kept), moments=at)
@@ -113,8 +113,12 @@ class _Motion:
         kept = places.old | moved  # in between the curve is what it was
         rows, origins = rows.only(kept), origins.only(kept)
         found = Trajectory.of_joints(
-            *(rows.q, spots.on_path[kept], spots.path_m[kept]),
-            *(rows.times, rows.rates, rows.changes),
+            rows.q,
+            on_path=spots.on_path[kept],
+            path_m=spots.path_m[kept],
+            times=rows.times,
+            rates=rows.rates,
+            changes=rows.changes,
         )
         return replace(self, rows=found, origins=origins, moments=at[kept])
 
