@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +11,14 @@ from some_slow import few_of
 from benchmarks.hrm2000.passages import Hook
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.errors import InvalidFile, NoPlanFound, UnknownName
+from vdsm_pin.errors import InvalidFile, NoPlanFound, OutOfTime, UnknownName
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.goals import with_ends, with_path
 from vdsm_pin.planner.joint_lines import clear_line
+from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem, Posture
 from vdsm_pin.problem.scene import Obstacle, Scene
@@ -111,6 +116,21 @@ def test_joint_values_behind_a_core_are_come_to_as_their_own_curve_leads() -> No
     )
     np.testing.assert_allclose(told.joints[-1], motion.joints[-1], atol=1e-9)
     np.testing.assert_array_equal(told.joints, again.joints)
+
+
+def test_the_way_there_has_time_where_the_way_back_had_too_little() -> None:
+    goal = posture(bent(0.4, 0.0, 0.3, 0.2))
+    task, tried = to(goal, *wall(0.12)), list[FloatArray]()
+
+    def plan_with(asked: PlanningProblem, *given: Any) -> Plan:
+        tried.append(asked.path.start)
+        if len(tried) == 1:
+            raise OutOfTime(0.5)
+        return plan_fewest(asked, *given)
+
+    found = with_ends(task, plan_with)(with_path(task), link_clearance(task), 0.0)
+    np.testing.assert_allclose(tried, [goal.tip, START.tip])
+    np.testing.assert_allclose(found.trajectory.joints[-1], goal.joints, atol=1e-9)
 
 
 def test_a_goal_in_an_obstacle_is_refused_and_says_from_which_end() -> None:

@@ -14,18 +14,26 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres, row_centres, straight_joints
-from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.fewest.follow_the_leader import way_back
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.strategies import Strategy
+from vdsm_pin.planner.time_limit import with_share
 from vdsm_pin.problem.desired_path import Blocked, DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem, Posture
 from vdsm_pin.problem.trajectory import Trajectory
 
 JOINS: Final = 8
 """Rows of a motion from which a line to its other end is tried, evenly spread."""
+
+FIRST_SHARE: Final = 0.5
+"""Part of the time for the way back from joint values; the way there has the rest; [-].
+"""
+
+SPACING: Final = 0.0032
+"""Largest distance of the tip between two rows over the arm's length; [-]."""
 
 
 def with_path(problem: PlanningProblem) -> PlanningProblem:
@@ -50,8 +58,9 @@ def _from(
         end: With joints: how the arm shall stand there at best. It is followed in.
     """
     path = DesiredPath(
-        start.tip, tip[None], blocked=Blocked.FAIL, start_joints=start.joints
-    )
+        start.tip, tip[None], spacing=SPACING * problem.manipulator.total_length,
+        blocked=Blocked.FAIL, start_joints=start.joints,
+    )  # fmt: skip
     if end is not None and end.joints is not None:
         centres = row_centres(problem.manipulator, end.joints[None])[0]
         path = replace(path, insertion=way_back(centres)[::-1])
@@ -134,6 +143,7 @@ def _to_joints(
 
     Raises:
         Infeasible: If there is none that way; where it is proved, from one end.
+        OutOfTime: If none was found in time.
     """
     assert goal.joints is not None
     start, path = known.path.start_joints, known.path
@@ -145,9 +155,12 @@ def _to_joints(
     there = _from(known, begin, goal.tip, goal)
     reasons = []
     for asked, end, turned in ((back, start, True), (there, goal.joints, False)):
+        within = with_share(clearance, FIRST_SHARE) if turned else clearance
         try:
-            plan = plan_with(asked, clearance, margin)
-        except Infeasible as error:
+            plan = plan_with(asked, within, margin)
+        except (Infeasible, OutOfTime) as error:
+            if isinstance(error, OutOfTime) and not turned:
+                raise
             side = "back from the goal" if turned else "from the start"
             reasons.append(f"planned {side}: {error}")
             continue
