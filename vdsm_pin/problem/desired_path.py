@@ -159,6 +159,10 @@ class DesiredPath(ByValue):
             return stations
         return np.where(stations > self.length, stations - self.length, stations)
 
+    def within(self, station: float) -> float:
+        """One of such stations; [m]."""
+        return float(self.wrapped(np.array(station)))
+
     @cached_property
     def corners(self) -> FloatArray:
         """The polyline drawn, closing corner repeated, shape (m, 3); [m]."""

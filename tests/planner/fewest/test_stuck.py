@@ -13,12 +13,13 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
-from vdsm_pin.planner.fewest.explain import how_far, minimal, refuse
+from vdsm_pin.planner.fewest.explain import how_far, refuse
 from vdsm_pin.planner.fewest.explore import Explored, explore
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Effort, Insert
 from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.narrow_passage import narrowest_passage
+from vdsm_pin.planner.fewest.notes import minimal
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.search import Found

@@ -1,6 +1,7 @@
 """From coarse to fine: which searches are run, in which order, and when to stop.
 
-Everything is counted, nothing is timed: the same problem gives the same plan.
+Searches are counted, not timed: without a time limit the same problem gives the same
+plan. A limit ends them, and puts proofs off.
 """
 
 import itertools
@@ -159,17 +160,12 @@ def explore(
         NoWayOut: If the start is left at no level.
     """
     rows = path_rows(problem.path)
-    first = effort.levels[0]
-    length = problem.manipulator.total_length
-    judge = Judge(
-        problem, clearance, margin, first.slack * length, first.finest * length
-    )
+    first, judges = effort.levels[0], _Judges(problem, clearance, margin, weights)
     proof = prove_tips(held_from(problem, TIP_ONLY), clearance, rows.tips)
-    best = Explored(judge, None, rows, proof)
+    best = Explored(judges.of(first), None, rows, proof)
     yield best
     if best.proof.undrawable.all():
         return
-    judges = _Judges(problem, clearance, margin, weights)
     no_way_out: NoWayOut | None = None
     stuck: Stuck | None = None
     spaces = _Spaces(problem, clearance, margin)

@@ -13,17 +13,16 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase, broad_phase
 from vdsm_pin.planner.fewest.explain import (
     how_far,
-    notes_of,
     refuse,
     refuse_proved,
     say_drawn,
-    undrawn,
 )
 from vdsm_pin.planner.fewest.explore import Explored, explore
 from vdsm_pin.planner.fewest.joint_error import levers
 from vdsm_pin.planner.fewest.judge import check_cone
 from vdsm_pin.planner.fewest.levels import FULL, QUICK, Effort, leaning, pointed
 from vdsm_pin.planner.fewest.motion import Corners, Rows, dense_rows
+from vdsm_pin.planner.fewest.notes import notes_of, undrawn
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.search import Searched
 from vdsm_pin.planner.fewest.shortcut import lifted, shortcut, straightened
