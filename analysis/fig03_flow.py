@@ -23,7 +23,7 @@ STEPS: Final = (
 )  # fmt: skip
 WIDE, HIGH, PITCH = 3.1, 0.34, 0.52
 AFTER: Final = (
-    ("Coal measures every waypoint", "", "margins.py"),
+    ("Coal measures every waypoint", "", "planner/paper/steering.py"),
     ("the proof covers what lies between", "Eq. 22-24", "verification/verify.py"),
 )
 
@@ -52,11 +52,14 @@ def draw(runs: Runs) -> dict[str, Figure]:
     _box(axes, middle, last, "certified plan", "#dff3e2")
     left = middle - WIDE / 2
     first, fifth = height - 0.35, height - 0.35 - 4 * PITCH
-    for k, words in ((7, "a margin for that link\nand obstacle"), (8, "")):
+    slide = "joints slide on\nby what Coal\nsays is missing"
+    margin = "a margin for that\nlink and obstacle"
+    for k, over, words in ((7, 1.5, slide), (8, 0.5, margin)):
         y = height - 0.35 - PITCH * k
         axes.plot([left, left - 0.42, left - 0.42], [y, y, fifth], color=style.INK,
                   linewidth=0.7)  # fmt: skip
-        axes.text(left - 0.5, (y + fifth) / 2, words, size=6.2, ha="right", va="center")
+        axes.text(left - 0.5, y + over * PITCH, words, size=6.2, ha="right",
+                  va="center")  # fmt: skip
     _arrow(axes, (left - 0.42, fifth), (left, fifth))
     _arrow(axes, (left, first), (left - 0.42, first))
     axes.text(left - 0.5, first, "no: out of reach", size=6.2, ha="right", va="center")

@@ -14,7 +14,7 @@ from vdsm_pin import margins
 from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.margins import by_coal, by_link, raised_margins
+from vdsm_pin.margins import CoalMeasure, by_coal, of_pairs, raised_margins
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
@@ -22,7 +22,6 @@ from vdsm_pin.problem.desired_path import Approach
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_check
 from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances
@@ -44,7 +43,7 @@ def test_missing_clearance_between_waypoints_is_added_to_the_margin(
     """Without its reserve the planner comes too close between waypoints."""
 
     def close(
-        problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+        problem: PlanningProblem, clearance: LinkClearance, margin: Margin, *_: Any
     ) -> Plan:
         return plan_paper(problem, clearance, margin - TOLERANCES.planned_reserve)
 
@@ -83,7 +82,7 @@ def test_a_plan_that_cannot_be_certified_is_not_handed_out(
     """A planner that ignores the obstacle and the margin never gets through."""
 
     def blind(
-        problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+        problem: PlanningProblem, clearance: LinkClearance, margin: Margin, *_: Any
     ) -> Plan:
         free = replace(problem, scene=read_problem("paper/free").scene)
         return plan_paper(free, clearance, margin)
@@ -110,7 +109,7 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
     free = replace(task, scene=read_problem("paper/free").scene)
 
     def boasting(
-        problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+        problem: PlanningProblem, clearance: LinkClearance, margin: Margin, *_: Any
     ) -> Plan:
         lean, wide = (plan_fewest(problem, clearance, m) for m in (0.0, 0.03))
         blind = replace(plan_fewest(free, clearance, margin), problem=problem)
@@ -204,13 +203,13 @@ def test_only_the_link_that_coal_names_gets_a_margin() -> None:
     """A blunder of the planner at one link: the others keep what they had."""
     problem = short("obs3")
     plan = plan_paper(problem, link_clearance(problem), 0.0)
-    assert by_coal(plan, {}, NO_LIMIT) == ()
+    assert by_coal(plan, CoalMeasure(problem), {}) == ()
     tight = replace(problem, required_clearance=0.0037)
-    found = by_coal(replace(plan, problem=tight), {}, NO_LIMIT)
+    found = by_coal(replace(plan, problem=tight), CoalMeasure(tight), {})
     links = {one.link for one in found}
     assert links
     assert links < set(range(1, 9))
-    raised = by_link(raised_margins({}, found), 8)
+    raised = of_pairs(raised_margins({}, found), tight)
     assert set(np.flatnonzero(raised) + 1) == links
     for one in found:
         assert one.margin > tight.required_clearance - one.distance > 0.0

@@ -1,17 +1,17 @@
 """Margins that links keep from obstacles beyond the required clearance when planning.
 
-A margin of each link and obstacle is raised by what Coal or the proof finds missing. A
-strategy is told the largest of each link alone.
+A margin of each link and obstacle is raised by what Coal or the proof finds missing.
+Coal measures, the planner moves joints, the proof judges.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final, Literal, NamedTuple, TypeAlias
+from functools import cached_property
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.records import Adjustment, Margin, Miss, Plan, margin_table
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -24,8 +24,8 @@ OVERSHOOT: Final = 1.25
 swings a little farther; [-]."""
 
 NEAR: Final = 0.5
-"""Pairs are measured by Coal up to this part of the body's radius past the required
-clearance; [-]."""
+"""Pairs are measured by Coal up to this part of the body's radius past the clearance
+that is asked for; [-]."""
 
 
 Margins: TypeAlias = Mapping[tuple[int, str], float]
@@ -33,84 +33,71 @@ Margins: TypeAlias = Mapping[tuple[int, str], float]
 [m]."""
 
 
-@dataclass(frozen=True)
-class Adjustment:
-    """A margin that was raised after a round, and why.
-
-    Args:
-        moment: Where the clearance was missed, in waypoints of that round's motion.
-        link: 1 to N.
-        obstacle: Its name.
-        measured_by: "Coal" at a waypoint, or "proof" over an interval.
-        distance: What it found; [m].
-        margin: What the link keeps beyond the required clearance from now on; [m].
-    """
-
-    moment: float
-    link: int
-    obstacle: str
-    measured_by: Literal["Coal", "proof"]
-    distance: float
-    margin: float
-
-
-class Missing(NamedTuple):
-    """A link that comes nearer to an obstacle than required, where it comes nearest.
-
-    Args:
-        waypoint: Row of the trajectory, from 0.
-        link: 1 to N.
-        obstacle: Number of the obstacle in the scene, from 0.
-        distance: What Coal measures; [m].
-    """
-
-    waypoint: int
-    link: int
-    obstacle: int
-    distance: float
-
-
-def coal_missing(
-    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline = NO_LIMIT
-) -> tuple[Missing, ...]:
-    """Links that miss the required clearance at a row, as Coal measures it.
-
-    Coal measures, the planner moves joints, the proof judges: this is no verdict.
+class CoalMeasure:
+    """Coal's measure of motions in one scene, for planners and for margins.
 
     Args:
         problem: The scene and the required clearance.
-        trajectory: Every row is looked at.
         deadline: When to give up.
-
-    Returns:
-        One entry for each link and obstacle held apart that come too near, at their
-        worst row, in the order of links and obstacles. A distance that Coal cannot tell
-        is no reason to move: the proof decides.
-
-    Raises:
-        OutOfTime: If the time is over.
     """
-    worst: dict[tuple[int, int], Missing] = {}
-    arm, n_links = CoalArm(problem, deadline, links=False), problem.manipulator.n_links
-    room = NEAR * problem.manipulator.most_radius
-    for found in arm.near(trajectory, room, deadline=deadline):
-        short = found.distance < problem.required_clearance
-        for k in np.flatnonzero(short & np.isfinite(found.distance)):
-            pair, distance = found.pair[k], float(found.distance[k])
-            link = min(int(arm.pairs.one[pair]) + 1, n_links)
-            key = link, int(arm.pairs.other[pair]) - arm.pairs.n_own
-            if key not in worst or distance < worst[key].distance:
-                worst[key] = Missing(int(found.moment[k]), *key, distance)
-    return tuple(worst[key] for key in sorted(worst))
+
+    def __init__(self, problem: PlanningProblem, deadline: Deadline = NO_LIMIT) -> None:
+        self._problem, self._deadline = problem, deadline
+        self._clear: Trajectory | None = None
+
+    @cached_property
+    def _arm(self) -> CoalArm:
+        return CoalArm(self._problem, self._deadline, links=False)
+
+    def __call__(
+        self, trajectory: Trajectory, margin: Margin = 0.0, /
+    ) -> tuple[Miss, ...]:
+        """Links that miss the required clearance and a margin at a row.
+
+        Args:
+            trajectory: Every row is looked at.
+            margin: What links keep beyond the required clearance; [m].
+
+        Returns:
+            One entry for each link and obstacle held apart that come too near, at their
+            worst row, in the order of links and obstacles. A distance that Coal cannot
+            tell is no reason to move: the proof decides.
+
+        Raises:
+            OutOfTime: If the time is over.
+        """
+        if trajectory is self._clear:  # it keeps this and maybe more
+            return ()
+        problem, worst = self._problem, dict[tuple[int, int], tuple[float, int, int]]()
+        asked = problem.required_clearance + margin_table(problem, margin)
+        room = NEAR * problem.manipulator.most_radius
+        room += float(np.max(margin, initial=0.0))
+        arm, pairs = self._arm, self._arm.pairs
+        for found in arm.near(trajectory, room, deadline=self._deadline):
+            link = np.minimum(pairs.one[found.pair], problem.manipulator.n_links - 1)
+            obstacle = pairs.other[found.pair] - pairs.n_own
+            short = found.distance < asked[link, obstacle]
+            for k in np.flatnonzero(short & np.isfinite(found.distance)):
+                key, told = (int(link[k]), int(obstacle[k])), float(found.distance[k])
+                if key not in worst or told < worst[key][0]:
+                    worst[key] = told, int(found.moment[k]), int(found.pair[k])
+        if not worst:
+            self._clear = trajectory
+        return tuple(
+            Miss(row, link + 1, obstacle, told, *arm.witness(trajectory, row, pair))
+            for (link, obstacle), (told, row, pair) in sorted(worst.items())
+        )
 
 
-def by_coal(plan: Plan, margins: Margins, deadline: Deadline) -> tuple[Adjustment, ...]:
+def by_coal(
+    plan: Plan, measure: CoalMeasure, margins: Margins
+) -> tuple[Adjustment, ...]:
     """Raise margins where Coal measures less than required at a waypoint.
 
     Args:
         plan: With the problem whose clearance it has to keep.
+        measure: Of the same scene.
         margins: Those of the plan.
-        deadline: When to give up.
 
     Returns:
         One entry for each link and obstacle that are too near; none where all keep it.
@@ -118,14 +105,13 @@ def by_coal(plan: Plan, margins: Margins, deadline: Deadline) -> tuple[Adjustmen
     Raises:
         OutOfTime: If the time is over.
     """
-    problem = plan.problem
-    needed, names = problem.required_clearance, problem.scene.names
+    needed, names = plan.problem.required_clearance, plan.problem.scene.names
     adjustments = []
-    for one in coal_missing(problem, plan.trajectory, deadline):
-        pair = one.link, names[one.obstacle]
-        margin = _raised(margins, pair, needed - one.distance, one.distance - needed)
-        when = float(one.waypoint)
-        adjustments.append(Adjustment(when, *pair, "Coal", one.distance, margin))
+    for one in measure(plan.trajectory):
+        pair, missing = (one.link, names[one.obstacle]), needed - one.distance
+        margin = _raised(margins, pair, missing, -missing)
+        row = Adjustment(float(one.row), *pair, "Coal", one.distance, margin, one)
+        adjustments.append(row)
     return tuple(adjustments)
 
 
@@ -172,9 +158,10 @@ def raised_margins(margins: Margins, adjustments: tuple[Adjustment, ...]) -> Mar
     return {**margins, **{(one.link, one.obstacle): one.margin for one in adjustments}}
 
 
-def by_link(margins: Margins, n_links: int) -> FloatArray:
-    """The largest margin of each link from any obstacle, shape (N,); [m]."""
-    largest = np.zeros(n_links)
-    for (link, _), margin in margins.items():
-        largest[link - 1] = max(largest[link - 1], margin)
-    return largest
+def of_pairs(margins: Margins, problem: PlanningProblem) -> FloatArray:
+    """The margins of each link and obstacle, shape (N, n_obstacles); [m]."""
+    names = problem.scene.names
+    table = np.zeros((problem.manipulator.n_links, len(names)))
+    for (link, name), margin in margins.items():
+        table[link - 1, names.index(name)] = margin
+    return table

@@ -16,16 +16,16 @@ import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.margins import (
-    Adjustment,
+    CoalMeasure,
     Margins,
     by_coal,
-    by_link,
     by_proof,
+    of_pairs,
     raised_margins,
 )
 from vdsm_pin.planner.feed import within_feed
 from vdsm_pin.planner.goals import with_ends, with_path
-from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.records import Adjustment, Plan
 from vdsm_pin.planner.start import with_known_insides
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
@@ -48,7 +48,7 @@ from vdsm_pin.verification.start_links import check_links_at_start
 from vdsm_pin.verification.verify import verify
 
 MAX_ROUNDS: Final = 8
-"""Rounds before giving up."""
+"""Times that a strategy is asked before giving up."""
 
 HANDED_OUT: Final = (Verdict.CERTIFIED, Verdict.INCOMPLETE)
 """Verdicts of motions that are clear and within their limits at every instant."""
@@ -61,14 +61,15 @@ class Round:
     """One round of planning, measuring and verifying.
 
     Args:
-        margin: The largest that a link was asked to keep beyond the required
-            clearance; [m].
+        margin: The largest that a link was asked to keep from an obstacle beyond the
+            required clearance; [m].
         verdict: What the verification said; None where Coal found clearance missing
             and nothing was proved.
         clearance: Smallest clearance to obstacles, proved, or measured where nothing
             was proved; infinite without any; [m].
         reason: Why the round ended as it did, one sentence.
-        adjustments: The margins that were raised after it.
+        adjustments: The margins that were raised after it, or the joints that were
+            moved on.
     """
 
     margin: float
@@ -144,17 +145,18 @@ def _plan_at_rest(
     clearance = within_time(link_clearance(known.problem), deadline)
     rounds: list[Round] = []
     margins: Margins = {}
-    promised = _promised(problem)
-    while True:
+    promised, measure = _promised(problem), CoalMeasure(problem, deadline)
+    for asked in range(1, MAX_ROUNDS + 1):
         try:
-            largest = by_link(margins, problem.manipulator.n_links)
-            found = plan_with(known.problem, clearance, largest)
+            kept = of_pairs(margins, known.problem)
+            found = plan_with(known.problem, clearance, kept, measure)
             plan = _chosen(problem, found, deadline)
         except (Infeasible, OutOfTime) as error:
             error.notes = known.notes
             error.more = (f"before that {_story(rounds)}",) if rounds else ()
             raise
-        adjustments = by_coal(plan, margins, deadline)
+        rounds += [_measured(margins, ended) for ended in plan.rounds]
+        adjustments = by_coal(plan, measure, margins)
         if adjustments:
             rounds.append(_measured(margins, adjustments))
         else:
@@ -165,16 +167,17 @@ def _plan_at_rest(
                 deadline.check(UNPROVED)
             adjustments = by_proof(verification, margins)
             rounds.append(_proved(margins, verification, adjustments))
-        kept = in_mm(rounds[-1].margin)
-        say("planned with a margin of %s; %s", kept, rounds[-1].reason)
+        widest = in_mm(rounds[-1].margin)
+        say("planned with a margin of %s; %s", widest, rounds[-1].reason)
         if rounds[-1].verdict in HANDED_OUT:
             story = (_story(rounds),) if len(rounds) > 1 else ()
             told = (*plan.notes, *_unread_scheme(plan), *known.notes, *story)
             plan = replace(plan, notes=told)
             return Refinement(plan, verification, tuple(rounds))
-        if not adjustments or len(rounds) == MAX_ROUNDS:
-            raise NoPlanFound("; ".join([*known.notes, _story(rounds)]))
+        if not adjustments or asked == MAX_ROUNDS:
+            break
         margins = raised_margins(margins, adjustments)
+    raise NoPlanFound("; ".join([*known.notes, _story(rounds)]))
 
 
 def _unread_scheme(plan: Plan) -> tuple[str, ...]:

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.errors import UnknownName
-from vdsm_pin.margins import Adjustment
-from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.records import Adjustment, Plan
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Refinement, Round

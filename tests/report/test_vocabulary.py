@@ -28,6 +28,7 @@ WITHOUT_UNIT = {
     "moment", "first_moment", "last_moment",  # in waypoints
     "coverage",  # a share
     "changed_angles_mean_on_path",  # a number
+    "normal",  # a unit vector
     "proofs", "base",  # said in their descriptions
 }  # fmt: skip
 

@@ -374,7 +374,7 @@ def test_bounds_are_kept_where_they_fit(
     assert LowersSink(replace(asked, scene=Scene()), none).fits is False
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(8))
 def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -384,6 +384,10 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
     )
     pairs = CoalPairs(arm_assembly(asked))
     of_obstacles = np.flatnonzero(pairs.other >= pairs.n_own)
+    table = np.zeros((ARM.n_links, len(asked.scene.obstacles)))
+    if seed >= 4:
+        table = rng.choice([0.0, 0.1, 0.3], table.shape)
+    margin: Any = table if seed >= 4 else 0.0
     parts, expected = [], dict[tuple[int, int], tuple[Any, ...]]()
     for part in range(3):
         n = 60
@@ -393,23 +397,31 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
         parts.append(CoalDistances(moments + 0.0, pair, gaps, unknown, unknown))
         for k in range(n):
             other = int(pairs.other[pair[k]]) - pairs.n_own
-            if not (np.isfinite(gaps[k]) and gaps[k] < 0.5):
-                continue
             key = min(int(pairs.one[pair[k]]) + 1, ARM.n_links), other
+            kept = 0.5 + table[key[0] - 1, other]
+            if not (np.isfinite(gaps[k]) and gaps[k] < kept):
+                continue
             if key not in expected or gaps[k] < expected[key][1]:
                 expected[key] = k + n * part, gaps[k]
 
     def near(motion: str, room: float, **_: Any) -> Any:
-        assert room == margins.NEAR * ARM.most_radius
+        assert room == margins.NEAR * ARM.most_radius + np.max(margin)
         return parts
 
-    arm = SimpleNamespace(near=near, pairs=pairs, problem=asked)
+    def witness(motion: str, row: int, pair: int) -> Any:
+        return row, pair, None
+
+    arm = SimpleNamespace(near=near, pairs=pairs, problem=asked, witness=witness)
     monkeypatch.setattr(margins, "CoalArm", lambda *_, **__: arm)
-    blank: Any = None
-    found = margins.coal_missing(asked, blank)
+    blank: Any = "a motion"
+    found = margins.CoalMeasure(asked)(blank, margin)
     assert [(one.link, one.obstacle) for one in found] == sorted(expected)
     for one in found:
-        assert (one.waypoint, one.distance) == expected[one.link, one.obstacle]
+        assert (one.row, one.distance) == expected[one.link, one.obstacle]
+        row, pair = map(int, (one.on_link, one.on_obstacle))
+        of_link = min(int(pairs.one[pair]) + 1, ARM.n_links)
+        assert (row, of_link) == (one.row, one.link)
+        assert pairs.other[pair] - pairs.n_own == one.obstacle
 
 
 @pytest.mark.parametrize("travel", [0.0, 0.3, 2.0])
@@ -736,7 +748,7 @@ def test_without_obstacles_nothing_is_missing() -> None:
     problem = PlanningProblem("p", ARM, Scene(), None, 0.1, np.eye(4))
     still, rows = np.zeros(2), np.zeros((2, ARM.n_links))
     motion = Trajectory(still > 0, still, still, rows, rows)
-    assert margins.coal_missing(problem, motion) == ()
+    assert margins.CoalMeasure(problem)(motion) == ()
 
 
 def test_counterexamples_are_told_in_rows_of_the_trajectory() -> None:

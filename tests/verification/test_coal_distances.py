@@ -356,3 +356,51 @@ def test_of_a_mesh_around_the_arm_coal_knows_no_clearance() -> None:
     assert judged.coal is not None
     assert judged.coal.pair.size > 0
     assert not any(judged.pairs[k].obstacle for k in judged.coal.pair)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "points", "half_space"])
+def test_witness_and_normal_are_those_of_the_closed_form(shape: str) -> None:
+    """Of each link and of what is nearest to its axis, apart and through each other."""
+    rng, seen = np.random.default_rng(5), 0
+    for _ in range(6):
+        centre, size = rng.uniform([0.3, -0.8, -0.8], [3.0, 0.8, 0.8]), 0.05
+        spread = [np.zeros(3)] if shape == "sphere" else rng.uniform(-0.3, 0.3, (90, 3))
+        balls = centre + np.array(spread)
+        normal = unit(rng)
+        obstacle: scene.Obstacle = solids.PointCloud(shape, balls, size)
+        if shape == "sphere":
+            obstacle = solids.Sphere(shape, centre, size)
+        if shape == "half_space":
+            obstacle = solids.HalfSpace(shape, -0.5 * normal, normal)
+        problem, motion = problem_with(obstacle), trajectory_of(4)
+        arm, radius = CoalArm(problem, links=False), HRM8.most_radius
+        centres = joint_centres(HRM8, motion.x0, motion.alpha, motion.theta)
+        for found in arm.near(motion, np.inf):
+            for moment, pair, told in zip(
+                found.moment, found.pair, found.distance, strict=True
+            ):
+                link, row = int(arm.pairs.one[pair]), int(moment)
+                begin, end = centres[row, link], centres[row, link + 1]
+                way = end - begin
+                if shape == "half_space":
+                    foot = min((begin, end), key=lambda p: float(p @ normal))
+                    away, reach = normal, float(foot @ normal) + 0.5
+                    other = foot - reach * normal
+                else:
+                    share = np.clip((balls - begin) @ way / (way @ way), 0.0, 1.0)
+                    feet = begin + share[:, None] * way
+                    gaps = np.linalg.norm(feet - balls, axis=1)
+                    k = int(np.argmin(gaps))
+                    if len(balls) > 1 and np.partition(gaps, 1)[1] - gaps[k] < 1e-6:
+                        continue
+                    foot, away = feet[k], (feet[k] - balls[k]) / gaps[k]
+                    reach, other = gaps[k] - size, balls[k] + size * away
+                if told < 1e-3:
+                    continue  # below zero the sign alone is meant
+                near, far, by_coal = arm.witness(motion, row, int(pair))
+                seen += 1
+                assert told == pytest.approx(reach - radius, abs=1e-6)
+                np.testing.assert_allclose(by_coal, away, atol=1e-4)
+                np.testing.assert_allclose(near, foot - radius * away, atol=1e-4)
+                np.testing.assert_allclose(far, other, atol=1e-4)
+    assert seen > 50

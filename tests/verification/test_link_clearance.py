@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.arm.mounted import LinkBody
-from vdsm_pin.geometry.solids import Box, Sphere
+from vdsm_pin.geometry.solids import Box, Mesh, Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -138,3 +139,49 @@ def test_rounding_grows_with_the_largest_length_there_is(
     problem = PlanningProblem("p", arm, Scene(()), None, 0.0, np.eye(4))
     share = max(1.0, largest / TOLERANCES.scene_extent)
     assert arithmetic_pad(problem, pieces) == share * TOLERANCES.arithmetic
+
+
+@pytest.mark.parametrize("mesh", [False, True])
+@pytest.mark.parametrize("ignored", [False, True])
+def test_margins_are_kept_by_single_links_from_single_obstacles(
+    mesh: bool, ignored: bool
+) -> None:
+    """Against scenes of one obstacle each, the margin taken off link by link."""
+    rng, arm = np.random.default_rng([3, mesh, ignored]), built_in("hrm8")
+    if ignored:
+        arm = replace(arm, ignore_pairs=(("link 3", "one"),))
+    three: list[Any] = [
+        Sphere("one", np.array([1.5, 0.6, 0.1]), 0.2),
+        Box("two", np.array([2.0, -0.5, 0.3]), np.eye(3), np.full(3, 0.15)),
+        Sphere("three", np.array([0.8, 0.1, -0.6]), 0.1),
+    ]
+    if mesh:
+        made = trimesh.creation.box(np.full(3, 0.3))
+        corners = np.asarray(made.vertices) + np.array([2.0, -0.5, 0.3])
+        three[1] = Mesh("two", corners, np.asarray(made.faces))
+    problem = PlanningProblem("p", arm, Scene(tuple(three)), None, 0.0, np.eye(4))
+    table = np.where(rng.random((8, 3)) < 0.4, rng.uniform(0.0, 0.05, (8, 3)), 0.0)
+    alone = [link_clearance(replace(problem, scene=Scene((one,)))) for one in three]
+    near = np.zeros((200, 9, 3))
+    slopes = rng.uniform(-0.3, 0.3, (200, 8, 2))
+    near[:, 1:, 1:] = np.cumsum(slopes * arm.link_lengths[:, None], axis=1)
+    along = arm.link_lengths * np.sqrt(1.0 - (slopes**2).sum(axis=2))
+    near[:, 1:, 0] = np.cumsum(along, axis=1)
+    expected = np.min(
+        [told(near) - table[:, o] for o, told in enumerate(alone)], axis=0
+    )
+    kept = broad_phase(problem, link_clearance(problem), table).up_to(10.0)
+    told = replace(kept, floor=-np.inf)(near)
+    apart = expected > 1e-3
+    assert apart.mean() > 0.5
+    np.testing.assert_allclose(told[apart], expected[apart], atol=5e-6)
+    assert (told[~apart] < 2e-3).all()
+    bare = kept.bare(near)
+    clear = np.min([told(near) for told in alone], axis=0)
+    np.testing.assert_allclose(bare[apart], clear[apart], atol=5e-6)
+    # Of a tip, the margin of the last link counts.
+    tips = near[:, -1:].repeat(2, axis=1)
+    last = [told(tips, TIP)[:, 0] - table[-1, o] for o, told in enumerate(alone)]
+    found = replace(kept, floor=-np.inf)(tips, TIP)[:, 0]
+    far = np.min(last, axis=0) > 1e-3
+    np.testing.assert_allclose(found[far], np.min(last, axis=0)[far], atol=5e-6)

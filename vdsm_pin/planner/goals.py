@@ -7,7 +7,7 @@ the start to the goal's tip with such a line at its end. Where the arm is confin
 draws back along its own curve and goes in along that of the other end.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -18,7 +18,13 @@ from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.fewest.follow_the_leader import way_back
 from vdsm_pin.planner.joint_lines import clear_line
-from vdsm_pin.planner.records import LinkClearance, Margin, Plan
+from vdsm_pin.planner.records import (
+    UNMEASURED,
+    LinkClearance,
+    Margin,
+    Measure,
+    Plan,
+)
 from vdsm_pin.planner.strategies import Strategy
 from vdsm_pin.planner.time_limit import with_share
 from vdsm_pin.problem.desired_path import Blocked, DesiredPath
@@ -76,14 +82,20 @@ def with_ends(problem: PlanningProblem, plan_with: Strategy) -> Strategy:
     """
 
     def planned(
-        known: PlanningProblem, clearance: LinkClearance, margin: Margin
+        known: PlanningProblem,
+        clearance: LinkClearance,
+        margin: Margin,
+        measure: Measure = UNMEASURED,
     ) -> Plan:
+        def plan(asked: PlanningProblem, within: LinkClearance) -> Plan:
+            return plan_with(asked, within, margin, measure)
+
         if problem.goal is None:
-            plan = plan_with(known, clearance, margin)
-            return with_return(plan) if known.path.home else plan
+            found = plan(known, clearance)
+            return with_return(found) if known.path.home else found
         if problem.goal.joints is None:
-            return undrawing(plan_with(known, clearance, margin))
-        return _to_joints(known, problem.goal, clearance, margin, plan_with)
+            return undrawing(plan(known, clearance))
+        return _to_joints(known, problem.goal, clearance, margin, plan)
 
     return planned
 
@@ -130,7 +142,7 @@ def _to_joints(
     goal: Posture,
     clearance: LinkClearance,
     margin: Margin,
-    plan_with: Strategy,
+    plan_with: Callable[[PlanningProblem, LinkClearance], Plan],
 ) -> Plan:
     """A plan to joint values.
 
@@ -139,7 +151,7 @@ def _to_joints(
         goal: With joint values.
         clearance: Clearance of links at given joint centres.
         margin: Kept beyond the required clearance; [m].
-        plan_with: The strategy.
+        plan_with: The strategy, told all but the problem and its clearance.
 
     Raises:
         Infeasible: If there is none that way; where it is proved, from one end.
@@ -157,7 +169,7 @@ def _to_joints(
     for asked, end, turned in ((back, start, True), (there, goal.joints, False)):
         within = with_share(clearance, FIRST_SHARE) if turned else clearance
         try:
-            plan = plan_with(asked, within, margin)
+            plan = plan_with(asked, within)
         except (Infeasible, OutOfTime) as error:
             if isinstance(error, OutOfTime) and not turned:
                 raise

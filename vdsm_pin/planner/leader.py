@@ -15,7 +15,13 @@ from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.route import path_rows
-from vdsm_pin.planner.records import LinkClearance, Margin, Plan
+from vdsm_pin.planner.records import (
+    UNMEASURED,
+    LinkClearance,
+    Margin,
+    Measure,
+    Plan,
+)
 from vdsm_pin.planner.spacing import STRAYS, row_steps, stepped
 from vdsm_pin.planner.start import check_start, start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -27,7 +33,10 @@ FINEST: Final = 64
 
 
 def plan_follow_the_leader(
-    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    margin: Margin,
+    measure: Measure = UNMEASURED,
 ) -> Plan:
     """A plan whose arm follows its tip along the insertion and the path.
 
@@ -35,6 +44,7 @@ def plan_follow_the_leader(
         problem: What is asked.
         clearance: Clearance of links at given joint centres.
         margin: Not read: there is one such motion.
+        measure: Not read either.
 
     Raises:
         Infeasible: If the start is too close to an obstacle, or `NoPlanFound` where a

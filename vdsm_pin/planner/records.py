@@ -1,8 +1,10 @@
-"""What every strategy returns, and the clearance function it is given."""
+"""What every strategy returns, and what it is given to measure with."""
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
 
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze
@@ -48,6 +50,57 @@ class TipPath:
         freeze(self, "on_path", dtype=bool)
 
 
+class Miss(NamedTuple):
+    """A link that Coal measures nearer to an obstacle than asked, where it is nearest.
+
+    Args:
+        row: Of the trajectory, from 0.
+        link: 1 to N; a tool counts as part of the last one.
+        obstacle: Number of the obstacle in the scene, from 0.
+        distance: What Coal measures, below 0 where they meet; [m].
+        on_link: Coal's witness on the link or on what it carries, shape (3,); [m].
+        on_obstacle: Coal's witness on the obstacle, shape (3,); [m].
+        normal: Unit vector from the obstacle to the link, shape (3,); [-].
+    """
+
+    row: int
+    link: int
+    obstacle: int
+    distance: float
+    on_link: FloatArray
+    on_obstacle: FloatArray
+    normal: FloatArray
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """What a link missed after a round, and what was done about it.
+
+    Args:
+        moment: Where the clearance was missed, in waypoints of that round's motion.
+        link: 1 to N.
+        obstacle: Its name.
+        measured_by: "Coal" at a waypoint, or "proof" over an interval.
+        distance: What it found; [m].
+        margin: What the link keeps from the obstacle beyond the required clearance
+            from now on; where joints were moved, how far the danger region is grown
+            for both; [m].
+        miss: Coal's whole answer, None of the proof.
+        joints: Numbers of the joints that were moved on, 2 to N.
+        moved: How far along their auxiliary line; [m].
+    """
+
+    moment: float
+    link: int
+    obstacle: str
+    measured_by: Literal["Coal", "proof"]
+    distance: float
+    margin: float
+    miss: Miss | None = None
+    joints: tuple[int, ...] = ()
+    moved: float = 0.0
+
+
 @dataclass(frozen=True, repr=False)
 class Plan(Summarised):
     """A planned motion with what each step found.
@@ -65,6 +118,8 @@ class Plan(Summarised):
             largest joint error that is proved to be survived decides between them and
             this one, which loses a draw.
         steps: What each of the paper's steps found, by the strategy `paper`.
+        rounds: What Coal found too near after each lift of the strategy `paper`, and
+            how the joints were moved on for the next one.
     """
 
     problem: PlanningProblem
@@ -75,6 +130,7 @@ class Plan(Summarised):
     notes: tuple[str, ...] = ()
     rivals: tuple["Plan", ...] = ()
     steps: "PaperSteps | None" = None
+    rounds: tuple[tuple[Adjustment, ...], ...] = ()
 
     @cached_property
     def tip_path(self) -> TipPath:
@@ -101,8 +157,38 @@ class Plan(Summarised):
 
 
 Margin: TypeAlias = float | FloatArray
-"""What a plan keeps beyond the required clearance: one number, or one for each link,
-shape (N,); [m]."""
+"""What a plan keeps beyond the required clearance: one number, or one for each link and
+obstacle, shape (N, n_obstacles); [m]."""
+
+
+def margin_table(problem: PlanningProblem, margin: Margin) -> FloatArray:
+    """A margin for each link and obstacle, shape (N, n_obstacles); [m]."""
+    shape = problem.manipulator.n_links, len(problem.scene.obstacles)
+    return np.broadcast_to(np.asarray(margin, dtype=np.float64), shape)
+
+
+class Measure(Protocol):
+    """Coal's measure of a motion, passed in as `LinkClearance` is."""
+
+    def __call__(
+        self, trajectory: Trajectory, margin: Margin = 0.0, /
+    ) -> tuple[Miss, ...]:
+        """What comes nearer than the required clearance and a margin at a row.
+
+        Returns:
+            One entry for each link and obstacle, at their worst row.
+        """
+        ...
+
+
+def _unmeasured(trajectory: Trajectory, margin: Margin = 0.0, /) -> tuple[Miss, ...]:
+    """Nothing is missed."""
+    del trajectory, margin
+    return ()
+
+
+UNMEASURED: Final[Measure] = _unmeasured
+"""For plans whose rows nobody measures."""
 
 
 class LinkClearance(Protocol):

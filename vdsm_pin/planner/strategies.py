@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING, Final, TypeAlias, cast
 from vdsm_pin.errors import UnknownName
 
 if TYPE_CHECKING:
-    from vdsm_pin.planner.records import LinkClearance, Margin, Plan
+    from vdsm_pin.planner.records import LinkClearance, Margin, Measure, Plan
     from vdsm_pin.problem.planning_problem import PlanningProblem
 
-Strategy: TypeAlias = "Callable[[PlanningProblem, LinkClearance, Margin], Plan]"
-"""(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond
-the required clearance, of each link [m]; the refinement raises it where verification
-asks for it."""
+Strategy: TypeAlias = (
+    "Callable[[PlanningProblem, LinkClearance, Margin, Measure], Plan]"
+)
+"""(problem, clearance, margin, measure) -> plan. `margin` is what the strategy shall
+keep beyond the required clearance, of each link and obstacle [m]; the refinement raises
+it where Coal or the proof asks for it. `measure` is Coal's, for who moves joints by
+it."""
 
 STRATEGIES: Final[Mapping[str, str]] = MappingProxyType(
     {

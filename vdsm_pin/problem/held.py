@@ -7,7 +7,7 @@ that the same axes are held from, by the same radii, are one group; without
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, TypeAlias
 
@@ -158,6 +158,16 @@ class HeldApart:
                 side[on] = np.maximum(side[on], np.where(held, more, 0.0))
         counted = [one.link > 0 for one in bodies]
         return cls(arm, axes, radii, beyond, bool(pairs[counted].all()))
+
+    def keeping(self, margins: FloatArray) -> "HeldApart":
+        """The links and obstacles that have a margin, the links thicker by it.
+
+        Args:
+            margins: Shape (N, n_obstacles); [m].
+        """
+        link = np.minimum(np.arange(len(self.radii)), self.arm.n_links - 1)
+        radii = np.where(margins[link] > 0.0, self.radii + margins[link], -np.inf)
+        return replace(self, radii=radii, whole=False)
 
     def numbers(self, axes: Axes, shape: tuple[int, int]) -> IntArray | None:
         """The axis of each piece, row after row, shape (n * m,); None for any."""

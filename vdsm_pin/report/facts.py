@@ -43,6 +43,7 @@ from vdsm_pin.verification.records import (
 from vdsm_pin.verification.task import ignored_pairs
 
 if TYPE_CHECKING:  # whoever verifies needs no planner
+    from vdsm_pin.planner.records import Adjustment
     from vdsm_pin.refinement import Refinement
 
 
@@ -226,6 +227,32 @@ def tolerances() -> dict[str, ToleranceRow]:
     return {name: ToleranceRow(value=values[name], unit=UNITS[name]) for name in values}
 
 
+def _adjustment_row(
+    verification: ArmVerification, number: int, one: "Adjustment"
+) -> AdjustmentRow:
+    """What a link missed after a round."""
+    points: dict[str, Point | None] = {}
+    if one.miss is not None:
+        turned = verification.problem.T_world_base[:3, :3] @ one.miss.normal
+        points = {
+            "link_point_m": in_file_frame(verification, one.miss.on_link),
+            "other_point_m": in_file_frame(verification, one.miss.on_obstacle),
+            "normal": (float(turned[0]), float(turned[1]), float(turned[2])),
+        }
+    return AdjustmentRow(
+        round=number,
+        moment=one.moment,
+        link=one.link,
+        obstacle=one.obstacle,
+        measured_by=one.measured_by,
+        distance_m=finite(one.distance),
+        margin_m=one.margin,
+        joints=one.joints,
+        moved_m=one.moved if one.joints else None,
+        **points,
+    )
+
+
 def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
     """plan.json of one plan, its rounds and the verification it was accepted with."""
     plan, verification = refinement.plan, refinement.verification
@@ -240,15 +267,7 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
         notes=(*plan.notes, *input_notes(plan.problem, plan.trajectory)),
         rounds=len(refinement.rounds),
         adjustments=tuple(
-            AdjustmentRow(
-                round=number,
-                moment=one.moment,
-                link=one.link,
-                obstacle=one.obstacle,
-                measured_by=one.measured_by,
-                distance_m=finite(one.distance),
-                margin_m=one.margin,
-            )
+            _adjustment_row(verification, number, one)
             for number, ended in enumerate(refinement.rounds, start=1)
             for one in ended.adjustments
         ),

@@ -129,7 +129,8 @@ class PlanFile(ResultModel):
     )
     rounds: int = Field(description="rounds of plan, measure, verify, larger margins")
     adjustments: tuple[AdjustmentRow, ...] = Field(
-        default=(), description="margins raised between rounds, and what asked for it"
+        default=(),
+        description="what was missed after each round: margins raised, joints moved",
     )
     centres_error_m: FiniteFloat | None = Field(
         default=None,

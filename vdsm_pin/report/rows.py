@@ -296,7 +296,7 @@ class Hashes(ResultModel):
 
 
 class AdjustmentRow(ResultModel):
-    """A margin that was raised because a link missed the required clearance."""
+    """What a link missed after a round, and what was done about it."""
 
     round: int = Field(description="after which round of planning, from 1")
     moment: FiniteFloat = Field(description=f"where it was missed; {_MOMENT}")
@@ -308,5 +308,21 @@ class AdjustmentRow(ResultModel):
     distance_m: FiniteFloat | None = Field(description="what it found")
     margin_m: FiniteFloat = Field(
         description="kept by this link from this obstacle beyond the required "
-        "clearance in the next round"
+        "clearance in the next round; where joints moved, how far their danger region "
+        "is grown for both"
     )
+    link_point_m: Point | None = Field(
+        default=None, description=f"Coal's witness on the link; {_FRAME}"
+    )
+    other_point_m: Point | None = Field(
+        default=None, description=f"Coal's witness on the obstacle; {_FRAME}"
+    )
+    normal: Point | None = Field(
+        default=None,
+        description=f"by Coal, from the obstacle to the link, a unit vector; {_FRAME}",
+    )
+    joints: tuple[int, ...] = Field(
+        default=(),
+        description="those that slid on along their auxiliary line, by their numbers",
+    )
+    moved_m: FiniteFloat | None = Field(default=None, description="how far they did")

@@ -23,6 +23,7 @@ from vdsm_pin.problem.scene import Moving
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.coal_bodies import Witness
 from vdsm_pin.verification.coal_shapes import (
     CoalPairs,
     Sides,
@@ -181,15 +182,27 @@ class CoalArm:
     ) -> CoalDistances:
         """Ask both about pairs at moments in waypoints, shape (m,) each."""
         rows, place = np.unique(moments, return_inverse=True)
-        joints = trajectory.path.at_moments(rows)
-        now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
+        now, poses = self._placed(trajectory, rows)
         one, other = self.pairs.one[pair], self.pairs.other[pair]
-        poses = self._poses(now, trajectory.times_at(rows))
         found = self._shapes.distances(poses, Sides(place, one, other))
         lower, upper = self._brackets(
             self._axes(*now), Sides(place, one, self._column[pair])
         )
         return CoalDistances(moments, pair, found, lower, upper)
+
+    def witness(self, trajectory: Trajectory, row: int, pair: int) -> Witness:
+        """Where Coal has a pair nearest at a row, which it tells a distance of."""
+        _, poses = self._placed(trajectory, np.array([float(row)]))
+        one, other = self.pairs.one[[pair]], self.pairs.other[[pair]]
+        return self._shapes.witness(poses, Sides(np.zeros(1, np.int64), one, other))
+
+    def _placed(
+        self, trajectory: Trajectory, moments: FloatArray
+    ) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+        """x0, alpha and theta at moments in waypoints, and the poses of the frames."""
+        joints = trajectory.path.at_moments(moments)
+        now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
+        return now, self._poses(now, trajectory.times_at(moments))
 
     def _near(
         self, trajectory: Trajectory, room: float, travel: float, deadline: Deadline

@@ -9,7 +9,7 @@ to its skin, so that the sign of a body in a mesh has to come from elsewhere.
 
 import math
 from collections.abc import Iterable
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -63,12 +63,14 @@ class CoalCloud:
         self._each = reach
         self._reach = np.linalg.norm(high - self._middle, axis=1) + reach
 
-    def measure(self, request: Any, result: Any, geometry: Any, pose: Any) -> float:
-        """The distance of the nearest body; arguments as for `measure`; [m]."""
+    def nearest(
+        self, request: Any, result: Any, geometry: Any, pose: Any
+    ) -> tuple[float, CoalBody | None]:
+        """The nearest body and its distance; arguments as for `measure`; [m]."""
         import coal
 
         geometry.computeLocalAABB()
-        box, best = geometry.aabb_local, math.inf
+        box, best, found = geometry.aabb_local, math.inf, None
         bounds = _gaps(box, pose, self._middle) - self._reach
         for k in np.argsort(bounds):
             if bounds[k] > max(best, 0.0):
@@ -79,8 +81,10 @@ class CoalCloud:
                 if each[i] > max(best, 0.0):
                     break
                 body = placed(self._shape, group[i], self._rotation)
-                best = min(best, _answer(coal, request, result, geometry, pose, body))
-        return best
+                told = _answer(coal, request, result, geometry, pose, body)
+                if told < best:
+                    best, found = told, body
+        return best, found
 
 
 def _gaps(box: Any, pose: Any, points: FloatArray) -> FloatArray:
@@ -202,12 +206,21 @@ def measure(
     import coal
 
     result = coal.DistanceResult() if result is None else result
+    return _nearest(coal, request, result, geometry, pose, bodies)[0]
+
+
+def _nearest(
+    coal: Any, request: Any, result: Any, geometry: Any, pose: Any, bodies: CoalObstacle
+) -> tuple[float, CoalBody | None]:
+    """`measure`, and the part of the obstacle that is nearest."""
     if isinstance(bodies, CoalCloud):
-        return bodies.measure(request, result, geometry, pose)
-    best = math.inf
+        return bodies.nearest(request, result, geometry, pose)
+    best, found = math.inf, None
     for body in bodies:
-        best = min(best, _answer(coal, request, result, geometry, pose, body))
-    return best
+        told = _answer(coal, request, result, geometry, pose, body)
+        if told < best:
+            best, found = told, body
+    return best, found
 
 
 def _answer(
@@ -261,3 +274,42 @@ def measure_each(calls: Iterable[Call], count: int) -> FloatArray:
             if not found[pair] <= told:
                 found[pair] = told
     return np.array(found)
+
+
+class Witness(NamedTuple):
+    """Where Coal has two bodies nearest to each other.
+
+    Args:
+        near: On the first body, in the frame of the second, shape (3,); [m].
+        far: On the second body, the same; [m].
+        normal: Unit vector from the second body towards the first, the shortest way
+            out where they meet, shape (3,); [-].
+    """
+
+    near: FloatArray
+    far: FloatArray
+    normal: FloatArray
+
+
+def witness(calls: Iterable[Call]) -> Witness:
+    """The witness of the nearest of the calls of one pair, none of them without bodies.
+
+    Args:
+        calls: What is asked, of one pair.
+    """
+    import coal
+
+    request, result = distance_request(), coal.DistanceResult()
+    least, asked = math.inf, None
+    for _, shape, turn, shift, bodies in calls:
+        assert bodies
+        pose = coal.Transform3s(turn, shift)
+        told, body = _nearest(coal, request, result, shape, pose, bodies)
+        if body is not None and told < least:
+            least, asked = told, (shape, pose, body.geometry, body.pose)
+    assert asked is not None
+    result.clear()
+    coal.distance(*asked, request, result)
+    near, far = result.getNearestPoint1(), result.getNearestPoint2()
+    # Coal's normal goes from the first body to the second.
+    return Witness(np.array(near), np.array(far), -np.array(result.normal))

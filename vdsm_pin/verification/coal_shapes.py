@@ -5,7 +5,7 @@ The bodies of an assembly as Coal has them, and its pairs seen from them.
 Whoever asks has the frames' poses, from Pinocchio where it can.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -17,10 +17,13 @@ from vdsm_pin.proof.bodies import Body
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.coal_bodies import (
+    Call,
     CoalCloud,
     CoalObstacle,
+    Witness,
     coal_obstacle,
     measure_each,
+    witness,
 )
 from vdsm_pin.verification.coal_hulls import CoalBody, coal_parts
 
@@ -118,8 +121,20 @@ class CoalShapes:
             poses: T_base_frame at some rows, shape (n_rows, n_frames, 3, 4); [m].
             sides: The pairs.
         """
+        return measure_each(self._calls(poses, sides), len(sides.row))
+
+    def witness(self, poses: FloatArray, sides: Sides) -> Witness:
+        """Coal's witness of one pair, which it tells a distance of.
+
+        Args:
+            poses: As for `distances`.
+            sides: That pair.
+        """
+        return witness(self._calls(poses, sides))
+
+    def _calls(self, poses: FloatArray, sides: Sides) -> Iterator[Call]:
+        """Every part of every first body, pair by pair; as for `distances`."""
         first = self._parts.first
-        # Every part of every first body, pair by pair.
         n_parts = first[sides.one + 1] - first[sides.one]
         pair = np.repeat(np.arange(len(sides.row)), n_parts)
         within = np.arange(pair.size) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
@@ -127,8 +142,7 @@ class CoalShapes:
         places = self._places(poses, Sides(*(side[pair] for side in sides)), part)
         shapes = [self._parts.shapes[k] for k in part.tolist()]
         partners = [self._bodies[k] for k in sides.other[pair].tolist()]
-        calls = zip(pair.tolist(), shapes, *places, partners, strict=True)
-        return measure_each(calls, len(sides.row))
+        return zip(pair.tolist(), shapes, *places, partners, strict=True)
 
     def between_balls(
         self, poses: FloatArray, sides: Sides

@@ -11,7 +11,7 @@ from vdsm_pin.planner.paper.across_rail import AcrossRail, across_rail
 from vdsm_pin.planner.paper.lift import lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
-from vdsm_pin.planner.paper.sections import section_along
+from vdsm_pin.planner.paper.sections import Passed, section_along
 from vdsm_pin.planner.paper.tip_path import drawn_rows
 
 OBS3 = read_problem("paper/obs3")
@@ -22,7 +22,8 @@ POINTS = drawn_rows(OBS3.path, 0.0).points[::9]
 def choices() -> list[AcrossRail]:
     section = section_along(OBS3.scene.obstacles[0], "z")
     assert section is not None
-    return list(across_rail(OBS3, section, "z", np.zeros(ARM.n_links)))
+    passed = Passed(section, (0,))
+    return list(across_rail(OBS3, passed, "z", np.zeros(ARM.n_links)))
 
 
 def test_single_joints_and_both_ends_of_a_link_are_tried_on_both_sides() -> None:

@@ -146,7 +146,7 @@ def test_the_widest_region_counts_from_the_margin_that_is_asked_for() -> None:
     """
     problem, clearance = paper("obs1"), link_clearance(paper("obs1"))
     kept = []
-    for margin in (0.0, np.full(8, 2e-3)):
+    for margin in (0.0, np.full((8, 1), 2e-3)):
         plan = plan_paper_clearest(problem, clearance, margin)
         kept.append(float(clearance(plan.centres).min()))
         (found,) = re.findall(r"were to keep ([\d.]+) mm none", plan.notes[-1])

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vdsm_pin.compiled import borrowed, compiled
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hulls, Piece
 from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.ordering import coherent_order
@@ -106,9 +106,23 @@ class Cover:
             number: Which axis each is of, shape (n,); None where all are alike.
         """
         which, some, radii = self.group.held(ends, number)
+        return which, self._others(some) - radii
+
+    def least(
+        self, ends: FloatArray, number: IntArray | None, asked: "BroadPhase"
+    ) -> tuple[IntArray, FloatArray]:
+        """Clearance from all, as a broad phase has it; as `beside_meshes`."""
+        which, some, radii = self.group.held(ends, number)
+        least, mesh = self.bounds(some, radii, asked.far, asked.floor, asked.deadline)
+        near = np.flatnonzero(least < asked.far)
+        least[near] = self._others(some[near]) - radii[near]
+        return which, np.minimum(least, mesh)
+
+    def _others(self, ends: FloatArray) -> FloatArray:
+        """Distance from all but meshes, up to two steps less, shape (n,); [m]."""
         step = self.surfaces.step
-        gaps = link_clearances(self.others, self.insides, some, 0.0, step, step)
-        return which, gaps[:, 0] - radii
+        gaps = link_clearances(self.others, self.insides, ends, 0.0, step, step)
+        return np.asarray(gaps[:, 0])
 
 
 @dataclass(frozen=True)
@@ -126,6 +140,9 @@ class BroadPhase:
         far: A bound from boxes above this is left as it is; [m].
         step: Of `surfaces`; [m].
         deadline: When planning must have ended.
+        keeping: Which links keep a margin from which obstacles, None for none: the
+            clearance between these is less by the margin.
+        margins: The obstacles that some keep a margin from.
     """
 
     clearance: LinkClearance
@@ -135,6 +152,8 @@ class BroadPhase:
     far: float
     step: float
     deadline: Deadline = NO_LIMIT
+    keeping: HeldApart | None = None
+    margins: tuple[Cover, ...] = ()
 
     def __call__(self, centres: FloatArray, axes: Axes = None, /) -> FloatArray:
         """Joint centres (n, m + 1, 3) to lower bounds (n, m); [m]."""
@@ -170,6 +189,11 @@ class BroadPhase:
             for cover in self.covers:
                 which, gaps = cover.beside_meshes(ends[asked], of)
                 np.minimum.at(clearances, asked[which], gaps)
+        if self.keeping is not None:
+            number = self.keeping.numbers(axes, shape)
+            for cover in self.margins:
+                which, gaps = cover.least(ends, number, self)
+                np.minimum.at(clearances, which, gaps)
         return clearances.reshape(shape)
 
     def up_to(self, far: float) -> "BroadPhase":
@@ -180,22 +204,67 @@ class BroadPhase:
         """The same, for a part of the time that is left; [-]."""
         return replace(self, deadline=self.deadline.share(share))
 
+    @property
+    def bare(self) -> "BroadPhase":
+        """The same without margins."""
+        return replace(self, keeping=None, margins=())
 
-def broad_phase(problem: PlanningProblem, clearance: LinkClearance) -> BroadPhase:
-    """The clearance function of a problem with its boxes."""
-    obstacles, length = problem.scene.obstacles, problem.manipulator.total_length
-    covers = tuple(
-        Cover.of(tuple(obstacles[o] for o in group.obstacles), group, STEP * length)
-        for group in problem.held.groups
-    )
-    return BroadPhase(
+
+def broad_phase(
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    margins: FloatArray | None = None,
+) -> BroadPhase:
+    """The clearance function of a problem with its boxes.
+
+    Args:
+        problem: Arm and scene.
+        clearance: The clearance function.
+        margins: What links keep from obstacles besides, by which the clearance is less,
+            shape (N, n_obstacles); None for nothing; [m].
+    """
+    length = problem.manipulator.total_length
+    quick = BroadPhase(
         clearance,
-        covers,
+        _covers(problem, problem.held),
         problem.held,
         problem.required_clearance - TOLERANCES.planned_clearance,
         FAR * length,
         STEP * length,
         deadline=deadline_of(clearance),
+    )
+    if margins is None or not margins.any():
+        return quick
+    kept = problem.held.keeping(margins)
+    return replace(quick, keeping=kept, margins=_covers(problem, kept))
+
+
+def keeping(
+    problem: PlanningProblem, clearance: LinkClearance, margins: FloatArray
+) -> LinkClearance:
+    """The clearance function, less by what links keep from obstacles besides.
+
+    Arguments are those of `broad_phase`.
+    """
+    return broad_phase(problem, clearance, margins) if margins.any() else clearance
+
+
+def cuts_of(problem: PlanningProblem, clearance: LinkClearance) -> BoolArray | None:
+    """Joints at which pieces of an arm end for a clearance function, shape (N + 1,).
+
+    None where a piece may be of any links.
+    """
+    kept = getattr(clearance, "keeping", None)
+    if kept is None:
+        return None if problem.held.alike else problem.held.cuts
+    return np.asarray(problem.held.cuts | kept.cuts)
+
+
+def _covers(problem: PlanningProblem, held: HeldApart) -> tuple[Cover, ...]:
+    obstacles, step = problem.scene.obstacles, STEP * problem.manipulator.total_length
+    return tuple(
+        Cover.of(tuple(obstacles[o] for o in group.obstacles), group, step)
+        for group in held.groups
     )
 
 

@@ -146,7 +146,7 @@ def explore(
 
     Args:
         problem: What is asked.
-        clearance: The clearance function.
+        clearance: The clearance function; proofs do not see its margins.
         margin: Kept beyond the required clearance; [m].
         weights: What the strategy prefers.
         effort: How much is done before giving up.
@@ -161,7 +161,8 @@ def explore(
     """
     rows = path_rows(problem.path)
     first, judges = effort.levels[0], _Judges(problem, clearance, margin, weights)
-    proof = prove_tips(held_from(problem, TIP_ONLY), clearance, rows.tips)
+    bare = clearance.bare
+    proof = prove_tips(held_from(problem, TIP_ONLY), bare, rows.tips)
     best = Explored(judges.of(first), None, rows, proof)
     yield best
     if best.proof.undrawable.all():
@@ -205,14 +206,14 @@ def explore(
             # Seldom needed, so only now: can it be done at all?
             space = spaces.of_first((level, *levels))
             with suppress(OutOfTime):  # it goes on after the next level
-                best = proofs[0](clearance.hurried(PROOF_SHARE), best, space)
+                best = proofs[0](bare.hurried(PROOF_SHARE), best, space)
                 proofs = proofs[1:]
             yield best
             proof = best.proof.take(best.rows.as_stated)
             if proof.undrawable.all():
                 return
     for prove in proofs[:1]:
-        best = prove(clearance, best, None)
+        best = prove(bare, best, None)
         yield best
     if best.found is None and stuck is None and no_way_out is not None:
         raise no_way_out

@@ -14,7 +14,7 @@ import numpy as np
 
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.broad_phase import BroadPhase
+from vdsm_pin.planner.fewest.broad_phase import BroadPhase, cuts_of
 from vdsm_pin.planner.fewest.interval_parts import LONG_TRAVEL, Parts, parts_of_pieces
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.own_clearance import OwnClearance
@@ -129,7 +129,7 @@ class Judge:
         link_margins: FloatArray | None = None,
     ) -> None:
         self.problem, self.clearance = problem, clearance
-        self.link_margins = link_margins
+        self.link_margins, self.cuts = link_margins, cuts_of(problem, clearance)
         self.rough = clearance if rough is None else rough
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
@@ -203,8 +203,7 @@ class Judge:
         knees = intervals.knees(self.problem.manipulator)
         if self.link_margins is not None:
             return np.ones_like(knees)
-        held = self.problem.held
-        return knees if held.alike else knees | held.cuts
+        return knees if self.cuts is None else knees | self.cuts
 
     def _states(
         self,

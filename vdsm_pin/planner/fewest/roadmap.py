@@ -146,7 +146,7 @@ def build_roadmap(
             there, axes = aims[node // shapes.size], ends[:, 2] - ends[:, 1]
             looks = judge.cone.holds(ends[:, 0, 0], axes, there)
             node, ends, bends = node[looks], ends[looks], bends[looks]
-        if margins is not None or not problem.held.alike:
+        if margins is not None or judge.cuts is not None:
             ends = link_by_link(ends, arm.stations)
         clearances = _least(judge, ends)
         keep = clearances >= judge.required

@@ -34,11 +34,18 @@ from vdsm_pin.planner.fewest.unbend import (
     with_unbending,
 )
 from vdsm_pin.planner.largest_margin import IMPROVE_SHARE, Widest, drawn_length, widest
-from vdsm_pin.planner.records import LinkClearance, Margin, Plan
-from vdsm_pin.planner.start import check_start
+from vdsm_pin.planner.records import (
+    UNMEASURED,
+    LinkClearance,
+    Margin,
+    Measure,
+    Plan,
+    margin_table,
+)
+from vdsm_pin.planner.start import check_start, start_centres
 from vdsm_pin.planner.time_limit import with_share
 from vdsm_pin.problem.desired_path import Blocked
-from vdsm_pin.problem.held import TIP
+from vdsm_pin.problem.held import TIP, Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -57,33 +64,36 @@ CLEAREST: Final = CostWeights(angle=0.2, clearance=0.064, clearance_cost=8.0)
 
 
 def plan_fewest(
-    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    margin: Margin,
+    measure: Measure = UNMEASURED,
 ) -> Plan:
     """A plan that draws all it can with as few changed link angles as it finds.
 
     Args:
         problem: What is asked.
         clearance: Clearance of links at given joint centres.
-        margin: Kept beyond the required clearance, the largest by every link; [m].
+        margin: Kept beyond the required clearance; [m].
+        measure: Not read: Coal measures the finished motion.
 
     Raises:
         Infeasible: With the proof where there is one, else `NoPlanFound`.
     """
-    return _Search(problem, clearance, _largest(margin), "fewest", FEWEST).plan()
-
-
-def _largest(margin: Margin) -> float:
-    return float(np.max(margin, initial=0.0))
+    return _Search.of(problem, clearance, margin, "fewest", FEWEST).plan()
 
 
 def plan_clearest(
-    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    margin: Margin,
+    measure: Measure = UNMEASURED,
 ) -> Plan:
     """The plan with the largest clearance found, at the price of straight joints.
 
     Arguments and errors are those of `plan_fewest`.
     """
-    search = _Search(problem, clearance, _largest(margin), "clearest", CLEAREST)
+    search = _Search.of(problem, clearance, margin, "clearest", CLEAREST)
     found = search.clearer(search.plan())
     plan = found.plans[-1]
     if not problem.scene.obstacles:
@@ -92,7 +102,10 @@ def plan_clearest(
 
 
 def plan_sturdiest(
-    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    margin: Margin,
+    measure: Measure = UNMEASURED,
 ) -> Plan:
     """The plan thought to survive the largest error of all joints, and its rivals.
 
@@ -100,7 +113,7 @@ def plan_sturdiest(
     who can prove what a motion survives has the choice. Arguments and errors are those
     of `plan_fewest`.
     """
-    lean = _Search(problem, clearance, _largest(margin), "sturdiest", FEWEST)
+    lean = _Search.of(problem, clearance, margin, "sturdiest", FEWEST)
     wide = replace(lean, weights=CLEAREST)
     try:
         first = wide.plan()
@@ -134,13 +147,57 @@ def _if_found(plan: Callable[[], Plan]) -> list[Plan]:
 
 @dataclass(frozen=True)
 class _Search:
-    """Plans of one problem with more and more in reserve."""
+    """Plans of one problem with more and more in reserve.
+
+    Args:
+        problem: What is asked.
+        clearance: Clearance of links.
+        margin: Kept by every link beyond the required clearance; [m].
+        name: Of the strategy.
+        weights: What it prefers.
+        margins: What links keep from obstacles besides, shape (N, n_obstacles); None
+            for nothing; [m].
+    """
 
     problem: PlanningProblem
     clearance: LinkClearance
     margin: float
     name: str
     weights: CostWeights
+    margins: FloatArray | None = None
+
+    @classmethod
+    def of(
+        cls,
+        problem: PlanningProblem,
+        clearance: LinkClearance,
+        margin: Margin,
+        name: str,
+        weights: CostWeights,
+    ) -> "_Search":
+        """With a margin for each link and obstacle where the start keeps all of them.
+
+        From another start the way out is judged by how near it is itself: there the
+        largest margin is kept by every link.
+        """
+        table, start = margin_table(problem, margin), start_centres(problem)
+        largest = float(table.max(initial=0.0))
+        each = cls(problem, clearance, 0.0, name, weights, table)
+        if (
+            table.min(initial=largest) < largest
+            and leans_ahead(problem)
+            and np.isfinite(start).all()
+            and each.kept(start[None]).min() >= problem.required_clearance
+        ):
+            return each
+        return cls(problem, clearance, largest, name, weights)
+
+    def kept(self, centres: FloatArray, axes: Axes = None, /) -> FloatArray:
+        """The clearance of links, less by `margins`; [m]."""
+        if self.margins is None:
+            return self.clearance(centres, axes)
+        each = broad_phase(self.problem, self.clearance, self.margins)
+        return each.up_to(np.inf)(centres, axes)
 
     @property
     def clearance_kept(self) -> float:
@@ -178,7 +235,7 @@ class _Search:
         problem, reach = self.problem, float(levers(self.problem.manipulator)[-1])
         # What is kept is judged exactly, however much it is.
         most = self.margin + self.weights.joint_error * reach
-        quick = broad_phase(problem, self.clearance)
+        quick = broad_phase(problem, self.clearance, self.margins)
         quick = quick.up_to(quick.far + most)
         early = replace(quick, deadline=_early(quick.deadline))
         soon = _soon(problem, quick.deadline)
@@ -209,7 +266,7 @@ class _Search:
         alpha, theta = joint_angles(arm, rows.centres)
         # Proofs of what is needed ask no more than whether there is the clearance
         # required.
-        enough = clearance.up_to(problem.required_clearance)
+        enough = clearance.bare.up_to(problem.required_clearance)
         stations, on_path = _stations(corners, rows)
         trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
         return Plan(
@@ -248,8 +305,8 @@ class _Search:
 
     def clearer(self, first: Plan) -> Widest:
         """Plans with more and more clearance; [m]."""
-        low = float(self.clearance(first.centres).min()) - self.clearance_kept
-        start = float(self.clearance(first.centres[:1]).min())
+        low = float(self.kept(first.centres).min()) - self.clearance_kept
+        start = float(self.kept(first.centres[:1]).min())
         high = min(self._clearance_at_tips(first), start) - self.clearance_kept
         return widest(self.hurried.with_reserve, first, low, high, until=FINE * high)
 
@@ -264,13 +321,13 @@ class _Search:
 
     def survived(self, centres: FloatArray) -> float:
         """Error of all joints that configurations have room for, roughly; [rad]."""
-        clearances = self.clearance(centres) - self.clearance_kept
+        clearances = self.kept(centres) - self.clearance_kept
         return float((clearances / levers(self.problem.manipulator)).min())
 
     def _clearance_at_tips(self, plan: Plan) -> float:
         """Least clearance of the tip alone where it draws: no plan has more; [m]."""
         tips = plan.tip_path.points[plan.tip_path.on_path]
-        clearances = self.clearance(np.stack([tips, tips], axis=1), TIP)
+        clearances = self.kept(np.stack([tips, tips], axis=1), TIP)
         return float(clearances.min(initial=np.inf))
 
 

@@ -30,11 +30,22 @@ from vdsm_pin.planner.paper.bend_kernels import (
     least_moves,
 )
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.lift import largest_angles
+from vdsm_pin.planner.paper.lift import largest_angles, lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
-from vdsm_pin.planner.paper.sections import VIEWS, grown_by, hull_corners, planned_gap
-from vdsm_pin.planner.paper.tip_path import Route, drawn_rows, straight_route
+from vdsm_pin.planner.paper.sections import (
+    VIEWS,
+    Passed,
+    grown_by,
+    hull_corners,
+    planned_gap,
+)
+from vdsm_pin.planner.paper.tip_path import (
+    Route,
+    RowOf2D,
+    drawn_rows,
+    straight_route,
+)
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
 TRIAL_ROWS: Final = 48
@@ -56,7 +67,9 @@ class AcrossRail:
         side: The arm passes at larger w (1) or at smaller w (-1).
         bends: The joint that moves, 2..N, or the two at the ends of a link, or a
             joint between its neighbours, of which one moves more than in proportion.
-        margins: How far the region is grown for each link, shape (N,); [m].
+        margins: Kept beyond the required clearance by each link, shape (N,); [m].
+        growths: How far the region is grown for each link, no less, shape (N,); [m].
+        obstacles: Numbers in the scene of those that are gone round.
     """
 
     problem: PlanningProblem
@@ -65,6 +78,8 @@ class AcrossRail:
     side: int
     bends: tuple[int, ...]
     margins: FloatArray
+    growths: FloatArray
+    obstacles: tuple[int, ...]
 
     @property
     def passed(self) -> str:
@@ -75,7 +90,7 @@ class AcrossRail:
         """Step 4: as without obstacles; the tip itself must stay clear."""
         route = replace(straight_route(self.problem.path), notes=(self._told,))
         points = route.tip_path.points[:, [0, 1 + self.axis]]
-        inside = self.region.grown(self.margins[-1]).contains(points)
+        inside = self.region.grown(self.growths[-1]).contains(points)
         if inside.any():
             waypoint = int(np.argmax(inside))
             reason = (
@@ -172,7 +187,7 @@ class AcrossRail:
     def _beyond(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
         """How far joint j, bending alone, is beyond the middle, in body radii, (n,)."""
         joint = self.bends[1]
-        alone = replace(self, bends=(joint,))
+        alone = replace(self, bends=(joint,), growths=self.margins)
         bends = alone._arms(reference, tip_x, np.ones((len(reference), 1)))
         farthest = alone._farthest(reference)
         moves = np.asarray(least_moves(alone._passing, bends, farthest))
@@ -222,10 +237,34 @@ class AcrossRail:
 
     @cached_property
     def _passing(self) -> Passing:
-        margins = [self.margins[a:b].max() for a, b in pairwise(self._ends)]
+        margins = [self.growths[a:b].max() for a, b in pairwise(self._ends)]
         radii = self.region.radius + np.array(margins)
         lengths = np.diff(self.problem.manipulator.stations[self._ends])
         return Passing(self.region.corners, radii, lengths, self.axis)
+
+    def grown(self, growths: FloatArray) -> "AcrossRail":
+        """The same with the danger region grown for each link, shape (N,); [m]."""
+        return replace(self, growths=growths)
+
+    def sliding(self, side: int, link: int) -> list[tuple[int, ...]]:
+        """The joints that bend, whatever the link: the others follow in proportion."""
+        return [self.bends]
+
+    def slid(self, row: RowOf2D, joints: tuple[int, ...], by: float) -> RowOf2D:
+        """The waypoint with those that bend farther to their side; [m]."""
+        arm, tip_x = self.problem.manipulator, np.array([row.tip_x])
+        shares = self.shares(scale(arm, row.planar[None, -1]), tip_x)
+        return row._replace(
+            planar=self.moved(row.planar[None], self.side * by * shares)[0]
+        )
+
+    def growth_to(self, row: RowOf2D, link: int, joints: tuple[int, ...]) -> float:
+        """The region reaches the straight piece that the link is a part of; [m]."""
+        tip_x = np.array([row.tip_x])
+        centres = lift(self.problem.manipulator, row.planar[None], tip_x)
+        gaps = self.region.link_distances(centres[..., [0, 1 + self.axis]])[0]
+        piece = next(slice(a, b) for a, b in pairwise(self._ends) if a < link <= b)
+        return float(gaps[piece].min()) - self.region.radius
 
     @cached_property
     def _ends(self) -> list[int]:
@@ -259,18 +298,18 @@ class AcrossRail:
 
 
 def across_rail(
-    problem: PlanningProblem, section: DangerRegion, axis: str, margins: FloatArray
+    problem: PlanningProblem, passed: Passed, axis: str, margins: FloatArray
 ) -> Iterator[AcrossRail]:
     """Choices for one obstacle prismatic along Y or Z, the least bent first.
 
     Args:
         problem: What was asked.
-        section: The obstacle's section in the view (x, w).
+        passed: The obstacle and its section in the view (x, w).
         axis: "y" or "z", along which it is prismatic.
         margins: Kept beyond the required clearance by each link, shape (N,); [m].
     """
     manipulator = problem.manipulator
-    growth = grown_by(problem)
+    growth, section = grown_by(problem), passed.section
     which = VIEWS[axis][1] - 1
     points = drawn_rows(problem.path, 0.0).points
     points = points[:: max(1, len(points) // TRIAL_ROWS)]
@@ -282,7 +321,10 @@ def across_rail(
     for side in (first, -first):
         region = _with_lee(section, growth, side, problem)
         choices = [
-            AcrossRail(problem, region, which, side, some, margins) for some in bends
+            AcrossRail(
+                problem, region, which, side, some, margins, margins, passed.obstacles
+            )
+            for some in bends
         ]
         yield from sorted(choices, key=lambda choice: _rank(*choice.costs(points)))
 

@@ -22,11 +22,12 @@ from vdsm_pin.planner.paper.joint_paths import (
     bends,
     choose_rule,
     slide_joints,
+    slide_on,
 )
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps
-from vdsm_pin.planner.paper.sections import grown_by, planned_gap
-from vdsm_pin.planner.paper.tip_path import Route
+from vdsm_pin.planner.paper.sections import Passed, grown_by, planned_gap
+from vdsm_pin.planner.paper.tip_path import Route, RowOf2D
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
 
@@ -44,6 +45,7 @@ class AlongRail:
         region: The danger region of the tip; it holds those of both sides.
         rules: The rule of each side, by 1 and -1.
         margins: How far `forbidden` is grown for each link, shape (N,); [m].
+        obstacles: Numbers in the scene of those that are gone round.
     """
 
     problem: PlanningProblem
@@ -51,6 +53,7 @@ class AlongRail:
     region: DangerRegion
     rules: dict[int, SideRule]
     margins: FloatArray
+    obstacles: tuple[int, ...]
 
     @property
     def passed(self) -> str:
@@ -79,23 +82,65 @@ class AlongRail:
 
     def bends(self, points: FloatArray, side: int) -> FloatArray:
         """Largest link angle with the tip at points; infinite for none, (n,); [rad]."""
-        return bends(self.problem, self.forbidden, self.rules[side], points)
+        rule = self.rules[side]
+        return bends(self.problem, self.forbidden, rule, points, self.margins)
+
+    @property
+    def growths(self) -> FloatArray:
+        """How far the danger region is grown for the joints of each link, (N,); [m]."""
+        return self.rules[1].margins
+
+    def grown(self, growths: FloatArray) -> "AlongRail":
+        """The same with the danger region grown for each link, shape (N,); [m]."""
+        rules = {
+            side: replace(rule, margins=growths) for side, rule in self.rules.items()
+        }
+        # The tip ends the last link.
+        region = self.region.grown(float(growths[-1] - self.growths[-1]))
+        return replace(self, region=region, rules=rules)
+
+    def sliding(self, side: int, link: int) -> list[tuple[int, ...]]:
+        """Both its ends or one of them, but for O_1 and the tip.
+
+        Nothing slides where no obstacle is passed.
+        """
+        last = self.problem.manipulator.n_links
+        ends = [joint for joint in (link, link + 1) if 1 < joint <= last]
+        if side not in self.rules or not ends:
+            return []
+        return [*dict.fromkeys([tuple(ends), *((joint,) for joint in ends)])]
+
+    def slid(self, row: RowOf2D, joints: tuple[int, ...], by: float) -> RowOf2D:
+        """The waypoint with such joints farther along their line; [m]."""
+        planar, rows = row.planar.copy(), [joint - 1 for joint in joints]
+        planar[rows] = slide_on(planar[rows], self.rules[row.side], by)
+        return row._replace(planar=planar)
+
+    def growth_to(self, row: RowOf2D, link: int, joints: tuple[int, ...]) -> float:
+        """The region reaches the farthest of the joints; [m]."""
+        return float(self._gaps(row, joints).max())
+
+    def _gaps(self, row: RowOf2D, joints: tuple[int, ...]) -> FloatArray:
+        """How far joints are from their region, not grown, shape (n,); [m]."""
+        region = self.rules[row.side].region
+        places = row.planar[[joint - 1 for joint in joints]]
+        return core_gaps(region.corners, places) - region.radius
 
 
 def along_rail(
-    problem: PlanningProblem, section: DangerRegion, margins: FloatArray
+    problem: PlanningProblem, passed: Passed, margins: FloatArray
 ) -> Iterator[AlongRail]:
     """Choices for one obstacle prismatic along X, the paper's own first.
 
     Args:
         problem: What was asked.
-        section: The obstacle's section in the plane Y0Z0.
+        passed: The obstacle and its section in the plane Y0Z0.
         margins: Kept beyond the required clearance by each link, shape (N,); [m].
 
     Raises:
         PathBlocked: If the rail or the start lies in the danger region.
     """
-    growth = grown_by(problem)
+    growth, section = grown_by(problem), passed.section
     forbidden = section.grown(growth)
     for what, point in (
         ("the rail", np.zeros(2)),
@@ -109,10 +154,14 @@ def along_rail(
             )
             raise PathBlocked(obstacle=section.name, reason=reason)
     shapes = _shapes(problem, section, growth)
-    yield _choice(problem, forbidden, shapes, margins)
+
+    def choice(some: list[DangerRegion]) -> AlongRail:
+        return _choice(problem, forbidden, some, margins, passed.obstacles)
+
+    yield choice(shapes)
     if len(shapes) > 1:
         for shape in shapes[::-3]:
-            yield _choice(problem, forbidden, [shape], margins)
+            yield choice([shape])
 
 
 def _shapes(
@@ -133,6 +182,7 @@ def _choice(
     forbidden: DangerRegion,
     shapes: list[DangerRegion],
     margins: FloatArray,
+    obstacles: tuple[int, ...],
 ) -> AlongRail:
     """For each side the rule that brings the tip farthest along its path."""
     sequences = _sequences(problem, shapes[0])
@@ -147,7 +197,7 @@ def _choice(
     # The tip ends the last link, whose margin it keeps.
     radius = shapes[_rank(bluntest, shapes)].radius + grown + margins[-1]
     region = replace(bluntest, radius=radius)
-    return AlongRail(problem, forbidden, region, rules, margins)
+    return AlongRail(problem, forbidden, region, rules, margins, obstacles)
 
 
 def _sequences(

@@ -4,7 +4,7 @@ An avoidance fixes Steps 4 and 5: where the tip goes, and where the joints go in
 projection. The pipeline tries them in the order given here.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Final, Protocol
@@ -16,8 +16,8 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.across_rail import across_rail
 from vdsm_pin.planner.paper.along_rail import along_rail
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.sections import merged, section_along
-from vdsm_pin.planner.paper.tip_path import Route, straight_route
+from vdsm_pin.planner.paper.sections import Passed, merged, section_along
+from vdsm_pin.planner.paper.tip_path import Route, RowOf2D, straight_route
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
@@ -60,19 +60,53 @@ class Avoidance(Protocol):
         ...
 
 
+class WayRound(Avoidance, Protocol):
+    """An avoidance whose joints slide on where Coal asks for it."""
+
+    @property
+    def obstacles(self) -> tuple[int, ...]:
+        """Numbers in the scene of the obstacles that are gone round."""
+        ...
+
+    @property
+    def growths(self) -> FloatArray:
+        """How far the danger region is grown for the joints of each link, (N,); [m]."""
+        ...
+
+    def grown(self, growths: FloatArray) -> "WayRound":
+        """The same with the danger region grown for each link, shape (N,); [m]."""
+        ...
+
+    def sliding(self, side: int, link: int) -> list[tuple[int, ...]]:
+        """Which joints may slide for a link, by their numbers, the preferred first."""
+        ...
+
+    def slid(self, row: RowOf2D, joints: tuple[int, ...], by: float) -> RowOf2D:
+        """The waypoint with such joints farther along their line; [m]."""
+        ...
+
+    def growth_to(self, row: RowOf2D, link: int, joints: tuple[int, ...]) -> float:
+        """How far the region is to grow for the joints of a link to slide there; [m].
+
+        Args:
+            row: As `slid` leaves it.
+            link: 1 to N.
+            joints: Those that slid.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Straight:
     """No obstacle is met: the arm stays straight (paper, section 3).
 
     Args:
         problem: What was asked.
-        link_clearance: Clearance of every link at given joint centres.
-        margins: Kept beyond the required clearance by each link, shape (N,); [m].
+        link_clearance: Clearance of every link at given joint centres, less margins.
     """
 
     problem: PlanningProblem
     link_clearance: LinkClearance
-    margins: FloatArray
 
     @property
     def passed(self) -> str:
@@ -88,7 +122,7 @@ class Straight:
         return few if few < needed else self._least(centres)
 
     def _least(self, centres: FloatArray) -> float:
-        return float((self.link_clearance(centres) - self.margins).min())
+        return float(self.link_clearance(centres).min())
 
     def route(self, missing: float) -> Route:
         """Step 4 without obstacles: the whole path."""
@@ -99,7 +133,9 @@ class Straight:
         return reference
 
 
-def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoidance]:
+def avoidances(
+    problem: PlanningProblem, met: Sequence[int], margins: FloatArray
+) -> Iterator[WayRound]:
     """Every way the paper's rule offers to go round the scene's obstacles.
 
     A body that is prismatic along several axes is tried along X first, where only its
@@ -109,13 +145,16 @@ def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoida
 
     Args:
         problem: What was asked.
-        margins: Kept beyond the required clearance by each link, shape (N,); [m].
+        met: Numbers of the obstacles that a part of the arm may not touch.
+        margins: Kept beyond the required clearance by each link from each obstacle,
+            shape (N, n_obstacles); [m]. From several obstacles that are gone round as
+            one the largest is kept.
 
     Raises:
         NoPlanFound: If the paper's rule does not cover the scene.
         PathBlocked: If a view rules its obstacle out.
     """
-    obstacles = problem.scene.obstacles
+    obstacles = [problem.scene.obstacles[k] for k in met]
     if len(obstacles) > MOST_OBSTACLES:
         message = (
             f"there are {len(obstacles)} obstacles, and the straight arm is not clear "
@@ -136,12 +175,14 @@ def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoida
         )
         raise NoPlanFound(message)
     offered, refusal = False, None
-    for axis, section in groups:
+    for axis, members, section in groups:
+        passed = Passed(section, tuple(met[k] for k in members))
+        kept = margins[:, passed.obstacles].max(axis=1)
         try:
             found = (
-                along_rail(problem, section, margins)
+                along_rail(problem, passed, kept)
                 if axis == "x"
-                else across_rail(problem, section, axis, margins)
+                else across_rail(problem, passed, axis, kept)
             )
             for avoidance in found:
                 offered = True
@@ -154,16 +195,19 @@ def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoida
 
 def _groups(
     seen: Mapping[str, list[DangerRegion | None]],
-) -> list[tuple[str, DangerRegion]]:
-    """Sections to go round with their axes: of one obstacle, of two together, ..
+) -> list[tuple[str, tuple[int, ...], DangerRegion]]:
+    """Sections to go round: axis, and which they are; of one obstacle, two together, ..
 
     Args:
         seen: Section of every obstacle along each axis; None where it is none.
     """
-    sections = {axis: [one for one in found if one] for axis, found in seen.items()}
+    sections = {
+        axis: [(k, one) for k, one in enumerate(found) if one]
+        for axis, found in seen.items()
+    }
     most = max(map(len, sections.values()))
     return [
-        (axis, merged(some))
+        (axis, tuple(k for k, _ in some), merged([one for _, one in some]))
         for size in range(1, most + 1)
         for axis, found in sections.items()
         for some in combinations(found, size)

@@ -10,7 +10,13 @@ import numpy as np
 
 from vdsm_pin.planner.largest_margin import IMPROVE_SHARE, widest
 from vdsm_pin.planner.paper.pipeline import plan_paper
-from vdsm_pin.planner.records import LinkClearance, Margin, Plan
+from vdsm_pin.planner.records import (
+    UNMEASURED,
+    LinkClearance,
+    Margin,
+    Measure,
+    Plan,
+)
 from vdsm_pin.planner.time_limit import with_share
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -20,26 +26,38 @@ ROUNDS: Final = 20
 
 
 def plan_paper_clearest(
-    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    margin: Margin,
+    measure: Measure = UNMEASURED,
 ) -> Plan:
     """The plan of the paper's rule with the widest danger region that draws as much.
 
     Arguments and errors are those of `plan_paper`.
     """
-    kept, name = problem.required_clearance + np.max(margin), "paper-clearest"
+    name = "paper-clearest"
     first = plan_paper(problem, clearance, margin)
     if not problem.scene.obstacles:
         return replace(first, strategy=name)
+    kept = problem.required_clearance + np.max(margin)
     low = float(clearance(first.centres).min()) - kept
     high = float(clearance(first.centres[:1]).min()) - kept
     hurried = with_share(clearance, IMPROVE_SHARE)
+    made = [(0.0, first)]
+
+    def wider(more: float) -> Plan:
+        made.append((more, plan_paper(problem, hurried, margin + more)))
+        return made[-1][1]
+
     found = widest(
-        lambda more: plan_paper(problem, hurried, margin + more),
+        wider,
         first,
         max(low, 0.0),
         high,
         rounds=ROUNDS,
         until=TOLERANCES.widest_region,
     )
-    plan = found.plans[-1]
+    # The widest of them is made once more, Coal measuring.
+    more = next(reserve for reserve, plan in made if plan is found.plans[-1])
+    plan = plan_paper(problem, clearance, margin + more, measure)
     return replace(plan, strategy=name, notes=(*plan.notes, found.told(kept)))

@@ -56,7 +56,7 @@ class SideRule:
             about P_1, -1 for the smaller.
         direction: The auxiliary lines, a unit vector towards that side, shape (2,);
             zero for the circles about P_1 through P'_i; [-].
-        margins: How far the region is grown for each link, shape (N,); [m].
+        margins: How far the region is grown for the joints of each link, (N,); [m].
     """
 
     region: DangerRegion
@@ -99,6 +99,21 @@ def slide_joints(
     slide = slide_of(rule.region.core, rule.side, rule.direction)
     slide_chains(slide, links_of(manipulator, rule.margins), planar)
     return planar
+
+
+def slide_on(points: FloatArray, rule: SideRule, by: float) -> FloatArray:
+    """Joints farther along their auxiliary lines, shape (n, 2); [m].
+
+    Args:
+        points: Shape (n, 2); [m].
+        rule: Which lines.
+        by: How far; [m].
+    """
+    if rule.direction.any():
+        return np.asarray(points + by * rule.direction)
+    turn = rule.side * by / np.linalg.norm(points, axis=1)
+    cos, sin, (y, z) = np.cos(turn), np.sin(turn), points.T
+    return np.stack([cos * y - sin * z, sin * y + cos * z], axis=1)
 
 
 def choose_rule(
@@ -183,6 +198,7 @@ def bends(
     forbidden: DangerRegion,
     rule: SideRule,
     points: FloatArray,
+    margins: FloatArray,
 ) -> FloatArray:
     """Largest link angles where links are long enough and clear, and no joint jumps.
 
@@ -191,12 +207,13 @@ def bends(
         forbidden: What the links keep out of.
         rule: How the joints slide.
         points: Tip positions that follow each other as waypoints do, (n, 3); [m].
+        margins: How far `forbidden` is grown for each link, shape (N,); [m].
 
     Returns:
         Shape (n,), infinite where the arm cannot stand; [rad].
     """
     manipulator = problem.manipulator
     planar = slide_joints(manipulator, project(points), rule)
-    links = links_of(manipulator, rule.margins)
+    links = links_of(manipulator, margins)
     able = standing(planar, Standing(links, forbidden.core, LARGEST_SWING))
     return np.where(able, largest_angles(planar, manipulator.link_lengths), np.inf)

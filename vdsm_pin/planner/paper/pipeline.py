@@ -1,19 +1,34 @@
 """The paper's method from problem to plan: seven steps, one call each."""
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound, PathBlocked
-from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import check_feasibility
-from vdsm_pin.planner.paper.avoidance import Avoidance, Straight, avoidances
+from vdsm_pin.planner.fewest.broad_phase import keeping
+from vdsm_pin.planner.paper.avoidance import (
+    Avoidance,
+    Straight,
+    WayRound,
+    avoidances,
+)
 from vdsm_pin.planner.paper.lift import lift
 from vdsm_pin.planner.paper.scale import references
 from vdsm_pin.planner.paper.solve import solve
+from vdsm_pin.planner.paper.steering import LIFTS, Steering
 from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.planner.paper.tip_path import Route, subdivided
-from vdsm_pin.planner.records import LinkClearance, Margin, Plan
+from vdsm_pin.planner.records import (
+    UNMEASURED,
+    Adjustment,
+    LinkClearance,
+    Margin,
+    Measure,
+    Plan,
+    margin_table,
+)
 from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem.desired_path import Blocked
@@ -30,7 +45,10 @@ top; [m]."""
 
 
 def plan_paper(
-    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    margin: Margin,
+    measure: Measure = UNMEASURED,
 ) -> Plan:
     """Plan by the paper's seven steps.
 
@@ -38,6 +56,7 @@ def plan_paper(
         problem: What is asked.
         clearance: Clearance of every link at given joint centres.
         margin: Kept beyond the required clearance at every waypoint; [m].
+        measure: Coal's, by which joints are moved on after each lift.
 
     Returns:
         The plan; every limit is kept at every waypoint.
@@ -48,8 +67,8 @@ def plan_paper(
     _check_straight(problem)
     check_feasibility(problem.manipulator, problem.path)
     check_start(problem, clearance)
-    margins = np.full(problem.manipulator.n_links, margin)
-    motion = _best_motion(problem, clearance, margins)
+    asked = Steering(problem, margin_table(problem, margin), measure)
+    motion = _best_motion(asked, keeping(problem, clearance, asked.margins))
     return Plan(
         problem,
         "paper",
@@ -62,6 +81,7 @@ def plan_paper(
         ),
         motion.route.notes,
         steps=motion,
+        rounds=motion.rounds,
     )
 
 
@@ -83,52 +103,74 @@ def _check_straight(problem: PlanningProblem) -> None:
 
 
 def _best_motion(
-    problem: PlanningProblem,
-    clearance: LinkClearance,
-    margins: FloatArray,
-    reserve: float = 0.0,
+    asked: Steering, clearance: LinkClearance, reserve: float = 0.0
 ) -> PaperSteps:
     """The first motion that draws the whole path, else the one that draws most.
 
     Args:
-        problem: What is asked.
-        clearance: Clearance of every link at given joint centres.
-        margins: Aimed at beyond the required clearance by each link, shape (N,); [m].
-        reserve: Part of the margins that rows between judged ones may use up; [m].
+        asked: What is kept, and who measures it.
+        clearance: Clearance of every link at given joint centres, less margins.
+        reserve: Aimed at beyond the margins, for rows between judged ones; [m].
     """
-    straight = Straight(problem, clearance, margins)
+    problem = asked.problem
+    straight = Straight(problem, clearance)
     motion = _motion(problem, straight, straight.route(np.inf))
-    if straight.clearance(motion.centres) >= problem.required_clearance:
+    kept = straight.clearance(motion.centres)
+    if kept >= problem.required_clearance and not asked.misses(motion):
         return motion
     if problem.scaling is not None:
-        _refuse_scaled(problem, straight.clearance(motion.centres))
+        _refuse_scaled(problem, kept)
     best: PaperSteps | None = None
     missing, reason, grazing = np.inf, None, np.inf
     # Those that a part of the arm may not touch.
-    met = problem.among(np.any(np.isfinite(problem.held.radii), axis=0))
-    for avoidance in avoidances(met, margins):
+    met = np.flatnonzero(np.any(np.isfinite(problem.held.radii), axis=0)).tolist()
+    for way in avoidances(problem, met, asked.margins + reserve):
         try:
-            route = avoidance.route(missing)  # Step 4
-            motion = _motion(problem, avoidance, route)
-            kept = avoidance.clearance(motion.centres)
+            motion = _steered(asked, way, missing)
+            kept = motion.avoidance.clearance(motion.centres) + reserve
             # The rule may know some of the obstacles only, and holds every link off.
-            if len(met.scene.obstacles) > 1 or not problem.held.whole:
+            if len(met) > 1 or not problem.held.whole:
                 kept = straight.clearance(motion.centres)
-            kept += reserve
             grazing = min(grazing, problem.required_clearance - kept)
-            _refuse_touch(problem, kept, avoidance.passed)
+            _refuse_touch(problem, kept, way.passed)
         except Infeasible as error:
             reason = reason or error
             continue
-        best, missing = motion, route.missing
+        best, missing = motion, motion.route.missing
         if missing == 0.0:
             break
     if best is None and reserve == 0.0 and grazing <= GRAZE:
-        return _best_motion(problem, clearance, margins + GRAZE, GRAZE)
+        return _best_motion(asked, clearance, GRAZE)
     if best is None:
         raise reason or NoPlanFound("the paper's rule offers no way round")
     _refuse_gaps(problem, best)
     return best
+
+
+def _steered(asked: Steering, way: WayRound, missing: float) -> PaperSteps:
+    """Steps 4 to 7; where Coal finds a lift too near, joints slide on for the next.
+
+    Args:
+        asked: What is kept, and who measures it.
+        way: How Steps 4 and 5 are settled.
+        missing: The route leaves less than this of the path undrawn; [m].
+    """
+    motion = _motion(asked.problem, way, way.route(missing))
+    rounds: list[tuple[Adjustment, ...]] = []
+    while len(rounds) < LIFTS:
+        farther, moved = asked.moved_on(way, motion)
+        if not moved:
+            break
+        try:
+            # The tip's route depends on the last link alone.
+            more = farther.growths[-1] > way.growths[-1]
+            route = farther.route(missing) if more else motion.route
+            motion = _motion(asked.problem, farther, route)
+        except Infeasible:
+            break  # whoever asked may ask for more room from the first
+        way = farther
+        rounds.append(moved)
+    return replace(motion, rounds=tuple(rounds))
 
 
 def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> PaperSteps:

@@ -7,7 +7,7 @@ side.
 """
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import shapely
@@ -21,6 +21,18 @@ from vdsm_pin.tolerances import TOLERANCES
 
 VIEWS: Final = {"x": (1, 2), "y": (0, 2), "z": (0, 1)}
 """The two coordinates seen along each axis."""
+
+
+class Passed(NamedTuple):
+    """What is gone round.
+
+    Args:
+        section: Of one obstacle, or one that holds several.
+        obstacles: Their numbers in the scene.
+    """
+
+    section: DangerRegion
+    obstacles: tuple[int, ...]
 
 
 def merged(sections: Sequence[DangerRegion]) -> DangerRegion:

@@ -6,6 +6,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.avoidance import Avoidance
 from vdsm_pin.planner.paper.tip_path import Route
+from vdsm_pin.planner.records import Adjustment
 from vdsm_pin.problem.trajectory import Trajectory
 
 
@@ -20,6 +21,8 @@ class PaperSteps:
         planar: Step 5, shape (n_samples, N + 1, 2); [m].
         centres: Step 6, shape (n_samples, N + 1, 3); [m].
         trajectory: Step 7.
+        rounds: What Coal found too near after each lift before this one, and how the
+            joints were moved on.
     """
 
     avoidance: Avoidance
@@ -28,6 +31,7 @@ class PaperSteps:
     planar: FloatArray
     centres: FloatArray
     trajectory: Trajectory
+    rounds: tuple[tuple[Adjustment, ...], ...] = ()
 
     @property
     def reads_approach(self) -> bool:

@@ -6,6 +6,7 @@ is closed. Off the path it steps back along -X, least at the ends and most at mi
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,6 +43,20 @@ class Route:
     def missing(self) -> float:
         """How much of the desired path is left out; [m]."""
         return length_of(self.undrawn)
+
+
+class RowOf2D(NamedTuple):
+    """One waypoint in the projection.
+
+    Args:
+        side: Of `Route.side`.
+        tip_x: x of the tip; [m].
+        planar: P_1..P_{N+1}, shape (N + 1, 2); [m].
+    """
+
+    side: int
+    tip_x: float
+    planar: FloatArray
 
 
 def length_of(stretches: FloatArray) -> float:
