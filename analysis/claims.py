@@ -283,8 +283,8 @@ def iterations(runs: Runs) -> tuple[Claim, list[str]]:
     claim = Claim(
         '"non-iterative", "at one time" (1)', "holds for Steps 1-3, 6 and 7",
         "these are closed forms; Steps 4 and 5 try lines and regions, across the rail "
-        "the bend is found by 12 trials and 24 bisections a waypoint, and waypoints "
-        "are inserted (table below)",
+        "the bend is found by 12 trials and 24 bisections a waypoint, twice where a "
+        "joint's neighbours share in it, and waypoints are inserted (table below)",
         "`python analysis/claims.py`",
     )  # fmt: skip
     return claim, table_lines(head, lines)
