@@ -1,19 +1,22 @@
 """The methods that the paper compares itself with, on its scenes, by one judge.
 
-    PYTHONPATH=. python analysis/baselines.py --out reports/paper [--sample K]
+    PYTHONPATH=. python analysis/baselines.py --out DIR [--sample K] [--log FILE]
 
 Writes `baselines.json` and `baselines.md`: for each method and scene whether the motion
-is certified, and what it is like; with `--sample K` also K problems of each feasible
-family of HRM-1000, as many as begin within `--minutes`. Methods are those of
-`benchmarks/hrm2000/references`.
+is certified, and what it is like; with `--sample K` also the first K problems of each
+feasible family of HRM-1000, for the slow methods no more than `--slow`; as many as
+begin within `--minutes`. With `--log` each answer is kept as it comes, and a run that
+was ended goes on from there. Methods are those of `benchmarks/hrm2000/references`.
 """
 
 import argparse
+import json
 import os
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.util import find_spec
 from itertools import product
 from math import inf
@@ -75,6 +78,8 @@ PER_FAMILY: Final = 112
 INTELLIGENT: Final = tuple(
     name for name, where in REFERENCES.items() if where.startswith("intelligent:")
 )
+SLOW: Final = (*INTELLIGENT, "neural-network")
+"""What takes nine tenths of the time of all."""
 COARSE_MM: Final = 20.0
 """Spacing of waypoints for these; [mm]. Problems of HRM-1000 have it from the start."""
 
@@ -94,15 +99,41 @@ class Line:
     clearance_mm: float | None
 
 
-def lines_of(method: str, folder: Path) -> Iterator[Line]:
-    """One method on every scene."""
-    for scene in SCENES:
-        file = folder / f"{scene}-{method}.yaml"
-        data = yaml.safe_load(built_in_text(f"paper/{scene}"))
-        if method in INTELLIGENT:
-            data["tip_path"]["spacing"] = COARSE_MM
-        file.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
-        yield line(scene, attempt(file, ("paper", 0), method, LIMIT))
+Ask = Callable[[str, str], Line]
+"""The answer of a method for a problem, both by name."""
+
+
+def kept(ask: Ask, log: Path | None) -> Ask:
+    """Answers that stand in a file already, or are added to it."""
+    if log is None:
+        return ask
+    old = log.read_text("utf-8").splitlines() if log.exists() else []
+    answers = [Line(**json.loads(text)) for text in old]
+    known = {(answer.method, answer.scene): answer for answer in answers}
+
+    def answered(method: str, scene: str) -> Line:
+        if (method, scene) in known:
+            return known[method, scene]
+        answer = ask(method, scene)
+        with log.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(answer)) + "\n")
+        return answer
+
+    return answered
+
+
+def asked(folder: Path, method: str, scene: str) -> Line:
+    """One method on one scene of the paper, or on one problem of HRM-1000."""
+    family, _, number = scene.rpartition("-")
+    if scene not in SCENES:
+        file = generate(folder / family, family, int(number))
+        return line(scene, attempt(file, (family, int(number)), method, SAMPLE_LIMIT))
+    file = folder / f"{scene}-{method}.yaml"
+    data = yaml.safe_load(built_in_text(f"paper/{scene}"))
+    if method in INTELLIGENT:
+        data["tip_path"]["spacing"] = COARSE_MM
+    file.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+    return line(scene, attempt(file, ("paper", 0), method, LIMIT))
 
 
 def line(scene: str, found: Outcome) -> Line:
@@ -115,17 +146,16 @@ def line(scene: str, found: Outcome) -> Line:
     )  # fmt: skip
 
 
-def sample(per_family: int, folder: Path, minutes: float) -> Iterator[Line]:
+def sample(ask: Ask, per_family: int, slow: int, minutes: float) -> Iterator[Line]:
     """The methods on the first problems of HRM-1000's feasible families."""
     families = [family for family in FAMILIES if family != "infeasible"]
     end = time.monotonic() + 60.0 * minutes
-    for number, family in product(range(per_family), families):
-        if family == families[0] and time.monotonic() > end:
+    for number in range(per_family):
+        if time.monotonic() > end:
             return
-        file = generate(folder / family, family, number)
-        for method in METHODS:
-            found = attempt(file, (family, number), method, SAMPLE_LIMIT)
-            yield line(f"{family}-{number:04d}", found)
+        methods = [name for name in METHODS if number < slow or name not in SLOW]
+        for family, method in product(families, methods):
+            yield ask(method, f"{family}-{number:04d}")
 
 
 PROVED: Final = "proved"
@@ -196,15 +226,21 @@ def markdown(lines: list[Line], sampled: list[Line]) -> str:
     rows = table_lines(names, cells)
     if not sampled:
         return "\n".join([*head, *rows, ""])
-    most, families = len(own("paper", sampled)), len(FAMILIES) - 1
-    every, each = families * PER_FAMILY, sum(one.seconds for one in sampled) / most
+    counts = {name: len(own(name, sampled)) for name in METHODS}
+    most, few, families = max(counts.values()), min(counts.values()), len(FAMILIES) - 1
+    every = families * PER_FAMILY
+    each = sum(one.seconds / counts[one.method] for one in sampled)
+    slow = "the same for every method."
+    if few < most:
+        late = ", ".join(name for name in METHODS if counts[name] < most)
+        slow = f"but for the slowest ({late}) the first {few} only."
     words = [
         "",
         "## A sample of HRM-1000",
         "",
         f"The first {most // families} of the {PER_FAMILY} problems of each of the",
         f"{families} feasible families, {SAMPLE_LIMIT:.0f} s of processor time for",
-        f"each plan: {most} of {every}, the same for every method. All together plan",
+        f"each plan: {most} of {every}, {slow} All together plan",
         f"one in {at_most(each)} s of processor time, and would all {every} in",
         f"{at_most(each * every / S_PER_HOUR, 1)} hours, the judge not counted.",
         "",
@@ -226,7 +262,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=REPORTS)
     parser.add_argument("--sample", type=int, default=0)
+    parser.add_argument("--slow", type=int, default=4)
     parser.add_argument("--minutes", type=float, default=inf)
+    parser.add_argument("--log", type=Path)
     options = parser.parse_args()
     missing = [name for name in LIBRARIES if find_spec(name) is None]
     if missing:
@@ -234,10 +272,12 @@ def main() -> None:
             f"{', '.join(missing)} missing: pip install 'vdsm-pin[references]'"
         )
     with tempfile.TemporaryDirectory() as folder:
-        for name in ("paper", "fewest"):  # machine code is loaded once
-            list(lines_of(name, Path(folder)))
-        lines = [one for name in METHODS for one in lines_of(name, Path(folder))]
-        sampled = list(sample(options.sample, Path(folder), options.minutes))
+        for name, scene in product(("paper", "fewest"), SCENES):
+            asked(Path(folder), name, scene)  # machine code is loaded once
+        ask = kept(partial(asked, Path(folder)), options.log)
+        lines = [ask(*one) for one in product(METHODS, SCENES)]
+        some = (options.sample, options.slow, options.minutes)
+        sampled = list(sample(ask, *some))
     rows = [*map(asdict, lines), *map(asdict, sampled)]
     write_table(options.out, "baselines", rows, markdown(lines, sampled))
 
