@@ -12,11 +12,15 @@ from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
-from vdsm_pin.planner.fewest import strategy
+from vdsm_pin.planner.fewest import insertion, strategy
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import turned_towards
 from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Corners
+from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.sparsify import sparser
+from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.problem.desired_path import Blocked, DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -183,3 +187,34 @@ def test_links_share_a_turn_towards_an_aim() -> None:
     np.testing.assert_allclose(np.linalg.norm(turned, axis=2), 1.0, atol=1e-12)
     np.testing.assert_allclose(turned[~some], shapes[~some], atol=1e-12)
     assert np.median(angles_between(turned[some, -1], aims[some])) < 0.15
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_the_second_way_in_ends_along_where_the_last_link_shall_look(
+    seen: bool,
+) -> None:
+    task = looking(Pointing(np.deg2rad(3.0), directions=ASIDE))
+    if not seen:
+        task = replace(task, tip_path=replace(task.path, pointing=None))
+    clearance = broad_phase(task, link_clearance(task))
+    judge = Judge(task, clearance, 0.0, 3e-4, 2e-3)
+    exact = replace(clearance, floor=-np.inf)
+    space = TipSpace(task, exact, judge.required, 0.06, 60_000)
+    rows = path_rows(task.path)
+    route = tip_route(task, rows, np.zeros(len(rows.tips), np.bool_), 0.06, 0.0)
+    level = Insert(population=10, routes=1, backtracks=2, seed=0, directed=True)
+    search = insertion._Search(judge, space, route, level)
+    ways = list(search._routes(search.tips))
+    aim = ASIDE[0] / np.linalg.norm(ASIDE[0])
+    last = WELD[0] - np.linspace(0.0, ARM.link_lengths[-1], 5)[:, None] * aim
+    along = [max(float(off_way(point, way)) for point in last) < 1e-9 for way in ways]
+    assert along.count(True) == int(seen)
+    assert along[1] == seen
+
+
+def off_way(point: FloatArray, way: FloatArray) -> float:
+    """Distance of a point from a polyline."""
+    step = np.diff(way, axis=0)
+    share = ((point - way[:-1]) * step).sum(axis=1) / (step**2).sum(axis=1)
+    nearest = way[:-1] + share.clip(0.0, 1.0)[:, None] * step
+    return float(np.linalg.norm(nearest - point, axis=1).min())

@@ -8,6 +8,7 @@ posture. What cannot be drawn at all is skipped.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -249,7 +250,8 @@ class _Search:
     def _routes(self, path: FloatArray) -> Iterator[FloatArray]:
         """Ways of the tip to a path's first point, first the one that is stated.
 
-        Then by way of points after it: who comes from there arrives in a posture that
+        The second one found comes from where the last link looks as it shall. Last
+        those by way of points after it: who comes from there arrives in a posture that
         goes on to there. An arm that starts bent also draws back until it is straight,
         and goes in from there.
         """
@@ -259,7 +261,10 @@ class _Search:
             way = way[np.append(True, (np.diff(way, axis=0) != 0.0).any(axis=1))]
             points, _ = stepped(way, self.space.spacing)
             yield np.vstack([self.back, points[1:]])
-        yield from self.space.routes(path[0], self.level.routes)
+        ways = self.space.routes(path[0], self.level.routes)
+        yield from islice(ways, 1)
+        yield from self._looking(path[0])
+        yield from ways
         yield from self.space.swing(path[0])
         if len(self.back) > 1:
             for route in self.outside.routes(path[0], 1):
@@ -268,6 +273,21 @@ class _Search:
             if ahead < len(path):
                 for route in self.space.routes(path[ahead], 1):
                     yield np.vstack([route, path[ahead - 1 :: -1]])
+
+    def _looking(self, goal: FloatArray) -> Iterator[FloatArray]:
+        """A way to a point that ends along where the last link shall look there."""
+        path = self.judge.problem.path
+        if path.pointing is None:
+            return
+        station = self.route.stations[(self.tips == goal).all(axis=1)][:1]
+        aim = path.aims(goal[None], station)[0]
+        if not np.isfinite(aim).all():
+            return
+        length = float(self.judge.problem.manipulator.link_lengths[-1])
+        before = goal - length / float(np.linalg.norm(aim)) * aim
+        for route in self.space.routes(before, 1):
+            points, _ = stepped(np.stack([before, goal]), self.space.spacing)
+            yield np.vstack([route, points[1:]])
 
     def _corners(self, visits: list[_Visit]) -> Corners:
         """The visits one after the other, out by the way in after all but the last."""
