@@ -131,7 +131,7 @@ def convert_robot(
     with staged(folder) as staging:
         (staging / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")
         write_messages(staging, motion, also)
-    return len(motion.q)
+    return motion.n_samples
 
 
 def message_name(ending: str) -> str:

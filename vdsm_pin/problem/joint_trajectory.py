@@ -20,8 +20,8 @@ class JointTrajectory(AnyMotion):
 
     Args:
         names: One for each column.
-        q: Shape (n_rows, n_columns), at least one row; [rad], [m].
-        times: Shape (n_rows,), rising; [s]. None where not known.
+        q: Shape (n_samples, n_columns), at least one row; [rad], [m].
+        times: Shape (n_samples,), rising; [s]. None where not known.
         rates: Velocities, as q; per [s]. None where not known.
         changes: Accelerations, as q; per [s^2]. None where not known.
         notes: What else a reader should know, a sentence each.
@@ -84,7 +84,7 @@ class JointTrajectory(AnyMotion):
             ),
         ):
             lacks = " and ".join(key for key, known in needed.items() if known is None)
-            if lacks and values is not None and values.any() and len(self.q) > 1:
+            if lacks and values is not None and values.any() and self.n_samples > 1:
                 message = f"has {what}, expected {lacks} too"
                 raise InvalidInput(message)
 
@@ -99,7 +99,7 @@ class JointTrajectory(AnyMotion):
         known = "none" if times is None else f"{times[0]:g} s to {times[-1]:g} s"
         return (
             ("joints", ", ".join(self.names)),
-            ("waypoints", str(len(self.q))),
+            ("waypoints", str(self.n_samples)),
             ("times", known),
         )
 

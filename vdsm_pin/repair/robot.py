@@ -54,7 +54,7 @@ class _Motion:
         rows = sampled(self.rows, places)
         if rows.rates is not None:
             origins, rows = on_curve(self.given, at, origins, rows)
-        others = self._others(rows.times, len(rows.q))
+        others = self._others(rows.times, rows.n_samples)
         asked, more = self.cell.asked, np.array([*margins.values()])
         slopes = _Slopes(self.cell, np.array([*margins]), more)
         names = [str(asked.pair(k)) for k in margins]
@@ -107,8 +107,8 @@ def repair_robot(
         OutOfTime: If none was found in time.
     """
     check_timed(cell.scene, motion)
-    origins = Origins.of(motion.q, [0, len(motion.q) - 1], pinned)
-    moments = np.arange(float(len(motion.q)))
+    origins = Origins.of(motion.q, [0, motion.n_samples - 1], pinned)
+    moments = np.arange(float(motion.n_samples))
     return repaired(
         _Motion(cell, motion, motion, moments, origins),
         lambda found: verify_robot(cell, found.rows, deadline, contacts=False),
