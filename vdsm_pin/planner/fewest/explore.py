@@ -159,64 +159,101 @@ def explore(
     Raises:
         NoWayOut: If the start is left at no level.
     """
-    rows = path_rows(problem.path)
-    first, judges = effort.levels[0], _Judges(problem, clearance, margin, weights)
-    bare = clearance.bare
-    proof = prove_tips(held_from(problem, TIP_ONLY), bare, rows.tips)
-    best = Explored(judges.of(first), None, rows, proof)
-    yield best
-    if best.proof.undrawable.all():
-        return
-    no_way_out: NoWayOut | None = None
-    stuck: Stuck | None = None
-    spaces = _Spaces(problem, clearance, margin)
-    proofs: list[Proving] = [_CutOff(best), _hemmed_in] if effort.proves else []
-    levels, room = effort.levels, Room(0.0, 0.0)
-    while levels:
-        if best.found is None and room.confined:
-            levels = confined_first(levels)
-        level, levels = levels[0], levels[1:]
-        now = Explored(judges.of(level), None, rows, proof, stuck)
+    yield from _Exploration(problem, clearance, margin, weights, effort).run(soon)
+
+
+class _Exploration:
+    """Searches level by level, and what they have come to; see `explore`."""
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        clearance: BroadPhase,
+        margin: float,
+        weights: CostWeights,
+        effort: Effort,
+    ) -> None:
+        self.weights, self.levels = weights, effort.levels
+        self.judges = _Judges(problem, clearance, margin, weights)
+        self.spaces = _Spaces(problem, clearance, margin)
+        self.rows, self.room = path_rows(problem.path), Room(0.0, 0.0)
+        self.bare = clearance.bare  # nothing is impossible for a margin
+        self.proof = prove_tips(held_from(problem, TIP_ONLY), self.bare, self.rows.tips)
+        first = self.judges.of(self.levels[0])
+        self.best = Explored(first, None, self.rows, self.proof)
+        self.proofs: tuple[Proving, ...] = (_CutOff(self.best), _hemmed_in)
+        self.proofs = self.proofs if effort.proves else ()
+        self.no_way_out: NoWayOut | None = None
+
+    def run(self, soon: Deadline) -> Iterator[Explored]:
+        """What is known after each search."""
+        yield self.best
+        first = self.levels[0]
+        while self.levels and not self.proof.undrawable.all():
+            level = self._next_level()
+            now = self._searched(level, soon)
+            if now.beats(self.best):
+                self.best = now
+            self.best = replace(self.best, stuck=now.stuck)
+            if isinstance(level, Insert) and self._may_have_fewer_knees():
+                self.levels = (BESIDE,)
+                yield self.best
+                continue
+            yield self.best
+            if not self.best.missing > 0.0 or (self.best.found and soon.passed):
+                return
+            if self.proofs and (level is first or isinstance(level, Insert)):
+                self._prove(level)
+                yield self.best
+        if self.levels:
+            return
+        for prove in self.proofs[:1]:
+            self.best = prove(self.bare, self.best, None)
+            yield self.best
+        if self.no_way_out and self.best.found is None and self.best.stuck is None:
+            raise self.no_way_out
+
+    def _next_level(self) -> Level:
+        """The next level, off the list of those that are left."""
+        if self.best.found is None and self.room.confined:
+            self.levels = confined_first(self.levels)
+        level, self.levels = self.levels[0], self.levels[1:]
+        return level
+
+    def _searched(self, level: Level, soon: Deadline) -> Explored:
+        """What one level comes to."""
+        judge, stuck = self.judges.of(level), self.best.stuck
+        now = Explored(judge, None, self.rows, self.proof, stuck)
         try:
             if isinstance(level, Insert):
-                now = _inserted(now, spaces.of(level), level, soon)
-                stuck = now.stuck
+                now = _inserted(now, self.spaces.of(level), level, soon)
             elif isinstance(level, Search):
-                found, room = _look(now.judge, level, rows, proof, weights)
+                found, self.room = _look(
+                    judge, level, self.rows, self.proof, self.weights
+                )
                 now = replace(now, found=found)
         except NoWayOut as error:
-            no_way_out = error
+            self.no_way_out = error
         LOG.debug("%s: %.4f m missing", level, now.missing)
-        if now.beats(best):
-            best = now
-        best = replace(best, stuck=stuck)
-        inserted = isinstance(level, Insert) and not best.missing > 0.0
-        if inserted and BESIDE in levels and room.one_knee_draws:
-            with suppress(OutOfTime):
-                best = best.sparser()
-            if best.knees > FEW_KNEES:
-                # It draws the path whole; a roadmap may with fewer knees.
-                levels = (BESIDE,)
-                yield best
-                continue
-        yield best
-        if not best.missing > 0.0 or (best.found is not None and soon.passed):
-            return
-        if proofs and (level is first or isinstance(level, Insert)):
-            # Seldom needed, so only now: can it be done at all?
-            space = spaces.of_first((level, *levels))
-            with suppress(OutOfTime):  # it goes on after the next level
-                best = proofs[0](bare.hurried(PROOF_SHARE), best, space)
-                proofs = proofs[1:]
-            yield best
-            proof = best.proof.take(best.rows.as_stated)
-            if proof.undrawable.all():
-                return
-    for prove in proofs[:1]:
-        best = prove(bare, best, None)
-        yield best
-    if best.found is None and stuck is None and no_way_out is not None:
-        raise no_way_out
+        return now
+
+    def _may_have_fewer_knees(self) -> bool:
+        """Whether a roadmap may draw with fewer knees what an insertion draws whole."""
+        untried = BESIDE in self.levels and self.room.one_knee_draws
+        if self.best.missing > 0.0 or not untried:
+            return False
+        with suppress(OutOfTime):
+            self.best = self.best.sparser()
+        return self.best.knees > FEW_KNEES
+
+    def _prove(self, level: Level) -> None:
+        """Ask whether it can be done at all: seldom needed, so only after a search."""
+        space = self.spaces.of_first((level, *self.levels))
+        with suppress(OutOfTime):  # it goes on after the next level
+            clearance = self.bare.hurried(PROOF_SHARE)
+            self.best = self.proofs[0](clearance, self.best, space)
+            self.proofs = self.proofs[1:]
+        self.proof = self.best.proof.take(self.best.rows.as_stated)
 
 
 class Room(NamedTuple):
