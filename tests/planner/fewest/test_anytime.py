@@ -26,7 +26,6 @@ from vdsm_pin.planner.fewest.strategy import (
     plan_fewest,
 )
 from vdsm_pin.planner.largest_margin import drawn_length, widest
-from vdsm_pin.planner.paper.clearest import plan_paper_clearest
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -34,8 +33,8 @@ from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
 
-Planner = Callable[[PlanningProblem, LinkClearance, FloatArray], Plan]
-NO_MARGIN = np.zeros(8)
+Planner = Callable[[PlanningProblem, LinkClearance, float], Plan]
+NO_MARGIN = 0.0
 
 
 @dataclass
@@ -67,7 +66,7 @@ def planned(planner: Planner, task: PlanningProblem, last: float) -> Plan | None
         return None
 
 
-@pytest.mark.parametrize("planner", [plan_fewest, plan_clearest, plan_paper_clearest])
+@pytest.mark.parametrize("planner", [plan_fewest, plan_clearest])
 def test_more_time_never_loses_a_plan(planner: Planner) -> None:
     task = corner("obs1")
     counted = Counted(link_clearance(task))
