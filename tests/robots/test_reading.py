@@ -154,6 +154,36 @@ def test_another_element_of_a_collision_is_noted(tmp_path: Path) -> None:
     assert [note for note in notes if note.startswith("<pose> of links is not read: ")]
 
 
+MOVES = """<robot name="r"><link name="w"><collision><geometry><sphere radius="1"/>
+  </geometry></collision></link><link name="a"/><link name="b"/>
+  <joint name="turn" type="continuous"><parent link="w"/><child link="a"/></joint>
+  <joint name="base" type="{}"><parent link="a"/><child link="b"/>{}</joint></robot>"""
+
+
+@pytest.mark.parametrize("kind", ["continuous", "planar", "floating"])
+@pytest.mark.parametrize(("ends", "noted"), [((-2, 2), True), ((0, 0), False)])
+def test_limits_that_a_type_of_joint_has_not_are_noted(
+    tmp_path: Path, kind: str, ends: tuple[int, int], noted: bool
+) -> None:
+    """Values beyond them are not refuted; a velocity is judged of any type."""
+    limit = '<axis xyz="0 0 1"/><limit lower="{}" upper="{}" velocity="3" effort="1"/>'
+    text = MOVES.format(kind, limit.format(*ends))
+    robot = read_robot(RobotFiles(write(tmp_path, "moves.urdf", text)))
+    assert any("none are not judged: 'base'" in note for note in robot.notes) is noted
+    assert not np.isfinite([joint.upper for joint in robot.joints]).any()
+    assert {joint.velocity for joint in robot.joints[1:]} == {3.0}
+
+
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_a_joint_of_several_values_that_mimics_is_refused(
+    tmp_path: Path, kind: str
+) -> None:
+    """It was read as one that moves by itself."""
+    file = write(tmp_path, "m.urdf", MOVES.format(kind, '<mimic joint="turn"/>'))
+    with pytest.raises(InvalidFile, match="'base' mimics 'turn', but has no one value"):
+        read_robot(RobotFiles(file))
+
+
 @pytest.mark.parametrize("tag", ["origin", "geometry"])
 def test_what_places_or_shapes_nothing_inside_a_link_is_noted(
     tmp_path: Path, tag: str

@@ -172,7 +172,11 @@ class JointReader:
             name, parts = joint.get("name", ""), _parts(joint)
             if joint.get("type") == "fixed":
                 self._keep(name, _Value(None))
-            elif joint.find("mimic") is not None and len(parts) == 1:
+            elif joint.find("mimic") is not None:
+                if len(parts) > 1:
+                    leader = _leader(joint)
+                    fault = f"joint {name!r} mimics {leader!r}, but has no one value"
+                    raise self.invalid(fault)
                 waiting.append(joint)
             else:
                 given = self.moving.limits.get(name, Limits())

@@ -2,6 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
+from typing import Final
 
 import numpy as np
 
@@ -17,7 +18,10 @@ from vdsm_pin.robots.link_solids import LinkReader
 from vdsm_pin.robots.model import Robot, reach_of
 from vdsm_pin.robots.srdf import Srdf
 from vdsm_pin.robots.xacro import urdf_text
-from vdsm_pin.text import listed
+from vdsm_pin.text import listed, plain_number
+
+UNLIMITED: Final = "continuous", "planar", "floating"
+"""Types of joints whose `lower` and `upper` nobody reads."""
 
 
 def read_robot(files: RobotFiles) -> Robot:
@@ -89,6 +93,9 @@ def _not_judged(document: ET.Element) -> Iterator[str]:
                 having.setdefault(tag, []).append(one.get("name", ""))
         for tag, names in having.items():
             yield f"<{tag}> of {kind}s is not read: {listed(names)}"
+    if names := [*_limits_not_meant(document)]:
+        what = "lower and upper limits of types of joints that have none are not judged"
+        yield f"{what}: {listed(names)}"
     for tag in ("origin", "geometry"):
         if names := [one.get("name", "") for one in document.findall(f"link[{tag}]")]:
             yield f"<{tag}> directly inside links is not read: {listed(names)}"
@@ -96,6 +103,16 @@ def _not_judged(document: ET.Element) -> Iterator[str]:
     spaces = {word[1:].partition("}")[0] for word in words if word.startswith("{")}
     if spaces:
         yield f"what is of these namespaces is not read: {listed(sorted(spaces))}"
+
+
+def _limits_not_meant(document: ET.Element) -> Iterator[str]:
+    """Joints with lower and upper limits that their types do not have."""
+    for joint in document.findall("joint"):
+        limit = joint.find("limit")
+        if limit is not None and joint.get("type") in UNLIMITED:
+            lower, upper = (plain_number(limit.get(k, "")) for k in ("lower", "upper"))
+            if lower < upper:
+                yield joint.get("name", "")
 
 
 def _bodies(
