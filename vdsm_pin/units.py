@@ -59,7 +59,7 @@ def quantity(value: float | None, unit: str, whole: Whole | None = None) -> str:
         last = digits if fixed else 1 - floor(log10(abs(shown)))
         shown = whole(round(shown * 10.0**last, _NOISE_DIGITS)) / 10.0**last
     text = f"{shown:.{digits}f}" if fixed else f"{shown:.1e}"
-    return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
+    return signed(text) + suffix
 
 
 def signed(text: str) -> str:
@@ -68,7 +68,9 @@ def signed(text: str) -> str:
     >>> signed("-1.5"), signed("-0.000")
     ('−1.5', '0.000')
     """
-    return text.replace("-", "−" if text.strip("-0.") else "")
+    if text[0] != "-":
+        return text
+    return ("−" if text.strip("-0.") else "") + text[1:]
 
 
 def measured(value: float | None, unit: str) -> str:

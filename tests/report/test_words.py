@@ -21,6 +21,7 @@ from vdsm_pin.units import (
     percent,
     percent_at_most,
     quantity,
+    signed,
 )
 
 
@@ -47,6 +48,22 @@ def test_quantities_read_as_people_write_them(
     value: float | None, unit: str, text: str
 ) -> None:
     assert quantity(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("-1.5", "−1.5"),
+        ("-0.000", "0.000"),
+        ("0", "0"),
+        ("12.0", "12.0"),
+        ("-10", "−10"),
+        ("1e-05", "1e-05"),
+        ("-2.0e-11", "−2.0e-11"),
+    ],
+)
+def test_a_number_has_a_minus_sign_and_zero_has_none(text: str, shown: str) -> None:
+    assert signed(text) == shown
 
 
 @pytest.mark.parametrize(

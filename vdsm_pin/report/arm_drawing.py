@@ -27,7 +27,7 @@ from vdsm_pin.report.motion_facts import changed_angles
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import FINE, surface
 from vdsm_pin.report.thinning import Thinned, thinned
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MM_PER_M, signed
 
 _DASHES: Final = ("", "7 3", "2 3")
 _INK: Final = "currentColor"
@@ -195,10 +195,11 @@ def _link_angle_chart(arm: Manipulator, psi: FloatArray) -> dict[str, Any]:
 
 def _base_chart(arm: Manipulator, x0: FloatArray) -> dict[str, Any]:
     low, high = (v * MM_PER_M for v in arm.base_range)
+    ends = " to ".join(signed(f"{value:g}") for value in (low, high))
     return {
         "id": "x0",
         "title": "Base position x₀",
-        "note": f"Along the rail, from {low:g} to {high:g} mm.".replace("-", "−"),
+        "note": f"Along the rail, from {ends} mm.",
         "unit": " mm",
         "axis": "x₀ [mm]",
         "limits": [limit("rail end", low), limit("rail end", high)],
