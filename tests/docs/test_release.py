@@ -80,3 +80,10 @@ def test_the_python_of_the_readme_runs() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert re.search(r"verdict +certified", ran.stdout)
+
+
+def test_a_version_of_the_changelog_has_each_heading_once() -> None:
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    for version in changelog.split("\n## ")[1:]:
+        headings = re.findall(r"^### .*", version, re.MULTILINE)
+        assert len(set(headings)) == len(headings), version.splitlines()[0]
