@@ -161,7 +161,7 @@ def urdf(
         for body, file in mesh_names(arm).items()
     }
     read = () if problem is None else problem.files
-    outputs = (out, (".urdf", ".xml")), *((file, (file.suffix,)) for file in files)
+    outputs = (out, (".urdf", ".xml")), *((file, ()) for file in files)
     check_outputs(read, files=outputs)
     for file, content in {**files, out: text}.items():
         with atomic_path(file) as path:

@@ -78,7 +78,8 @@ def check_outputs(
         inputs: Files that are read.
         folder: Where outputs go by their names; None for nowhere.
         names: Of these outputs.
-        files: Others, each with the endings one of which it has.
+        files: Others, each with the endings one of which it has; none where that is
+            as it may be.
 
     Raises:
         InvalidFile: If there is one; see `check_output_folder`, `check_output_file`,
@@ -92,7 +93,8 @@ def check_outputs(
         check_output_file(file)
     check_kept(outputs, inputs)
     for file, endings in files:
-        check_ending(file, *endings)
+        if endings:
+            check_ending(file, *endings)
 
 
 def check_kept(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
