@@ -88,6 +88,10 @@ class Tolerances:
     least_bracket: float = _held(1e-6, "m")
     """Width to which the bracket of the least clearance is narrowed; [m]."""
 
+    far_bracket: float = _held(0.5, "-")
+    """Part of the clearance that a bracket of a pair far beyond what is required may be
+    wide, in judging robots: no verdict hangs on it, and a new plane costs more; [-]."""
+
     coal_gjk: float = _held(1e-8, "m")
     """Coal's gjk_tolerance: 1e-6 is 1.5e-6 m unsafe, 1e-12 returns NaN; [m]."""
 

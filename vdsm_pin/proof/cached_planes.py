@@ -17,8 +17,9 @@ from vdsm_pin.proof.layouts import HELD_CLEARANCE, WIDTH
 from vdsm_pin.proof.plane_bounds import Runs, bound_above, bound_below, take_disc
 from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.terms import Mover, Task
+from vdsm_pin.tolerances import TOLERANCES
 
-WIDE: Final = 0.5
+WIDE: Final = TOLERANCES.far_bracket
 """Slack of clearances that are far; [-]."""
 
 
