@@ -31,20 +31,24 @@ class Widest:
 
     Args:
         plans: In the order of their reserves.
-        beyond: The least reserve that none was found to have, or none has.
+        beyond: The least reserve that was tried in vain, else one that nothing has.
+        tried: Whether it was tried.
         in_time: Whether the search came to its end before the time was over.
     """
 
     plans: list[Plan]
     beyond: float
-    in_time: bool
+    tried: bool = False
+    in_time: bool = True
 
     def told(self, kept: float) -> str:
         """What was found out, by the clearance kept without a reserve; [m]."""
         most = at_most_mm(kept + self.beyond)
-        if self.in_time:
+        if not self.in_time:
+            return "the time was over before all plans that keep more were tried"
+        if self.tried:
             return f"of the plans that were to keep {most} none draws as much"
-        return f"the time was over before plans that keep up to {most} were all tried"
+        return f"no plan keeps more than {most}, which the start or a tip leaves"
 
 
 def widest(
@@ -70,20 +74,20 @@ def widest(
         The plans, the first one included.
     """
     plans, whole = [first], drawn_length(first) - TOLERANCES.joint_centre
+    tried = False
     for _ in range(rounds):
         if not until < high - low < np.inf:
             break
         middle = (low + high) / 2.0
         try:
             plan = plan_with(middle)
-        except Infeasible:
-            high = middle
-            continue
         except OutOfTime:
-            return Widest(plans, high, in_time=False)
-        if drawn_length(plan) < whole:
-            high = middle
-        else:
+            return Widest(plans, high, tried, in_time=False)
+        except Infeasible:
+            plan = None
+        if plan is not None and drawn_length(plan) >= whole:
             plans.append(plan)
             low = middle
-    return Widest(plans, high, in_time=True)
+        else:
+            high, tried = middle, True
+    return Widest(plans, high, tried)

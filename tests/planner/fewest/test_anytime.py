@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from vdsm_pin.errors import OutOfTime
+from vdsm_pin.errors import NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.levels import (
@@ -22,8 +22,11 @@ from vdsm_pin.planner.fewest.levels import (
     pointed,
 )
 from vdsm_pin.planner.fewest.strategy import (
+    CLEAREST,
+    _Search,
     plan_clearest,
     plan_fewest,
+    plan_sturdiest,
 )
 from vdsm_pin.planner.largest_margin import drawn_length, widest
 from vdsm_pin.planner.records import LinkClearance, Plan
@@ -96,7 +99,44 @@ def test_an_improvement_that_takes_too_long_leaves_what_there_was() -> None:
     found = widest(plan_with, first, 0.0, 0.008)
     assert asked == [0.004, 0.006]
     assert found.plans == [first, first] and not found.in_time
-    assert "time was over before plans that keep up to 12.000 mm" in found.told(0.004)
+    assert "time was over before all plans that keep more" in found.told(0.004)
+
+
+def test_what_is_told_is_what_was_tried() -> None:
+    task = corner("free")
+    first = plan_fewest(task, link_clearance(task), NO_MARGIN)
+
+    def has(most: float) -> Callable[[float], Plan]:
+        def plan_with(reserve: float) -> Plan:
+            if reserve > most:
+                raise NoPlanFound(str(most))
+            return first
+
+        return plan_with
+
+    refused = widest(has(0.003), first, 0.0, 0.008, rounds=1)
+    assert refused.told(0.001) == (
+        "of the plans that were to keep 5.000 mm none draws as much"
+    )
+    for found in (
+        widest(has(1.0), first, 0.0, 0.008),
+        widest(has(0.0), first, 0.008, 0.008),
+    ):
+        assert "no plan keeps more than 9.000 mm" in found.told(0.001)
+
+
+@pytest.mark.parametrize("planner", [plan_clearest, plan_sturdiest])
+@pytest.mark.parametrize("after", [1, 2, 3])
+def test_time_that_ends_behind_the_first_plan_leaves_it(
+    planner: Planner, after: int
+) -> None:
+    """What better plans could have at most is asked before any of them is planned."""
+    task = corner("obs1")
+    first = Counted(link_clearance(task))
+    plan = _Search.of(task, first, NO_MARGIN, "clearest", CLEAREST).plan()
+    found = planned(planner, task, float(first.asked + after))
+    assert found is not None
+    np.testing.assert_array_equal(found.centres, plan.centres)
 
 
 def test_a_better_plan_is_looked_for_by_roadmaps_alone() -> None:

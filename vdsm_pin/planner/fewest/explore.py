@@ -207,7 +207,7 @@ class _Exploration:
                 yield self.best
         if self.levels:
             return
-        for prove in self.proofs[:1]:
+        for prove in reversed(self.proofs):
             self.best = prove(self.bare, self.best, None)
             yield self.best
         if self.no_way_out and self.best.found is None and self.best.stuck is None:

@@ -94,7 +94,8 @@ def plan_clearest(
     Arguments and errors are those of `plan_fewest`.
     """
     search = _Search.of(problem, clearance, margin, "clearest", CLEAREST)
-    found = search.clearer(search.plan())
+    first = search.plan()
+    found = _in_time(first, lambda: search.clearer(first))
     plan = found.plans[-1]
     if not problem.scene.obstacles:
         return plan
@@ -119,11 +120,15 @@ def plan_sturdiest(
         first = wide.plan()
     except Infeasible:
         return lean.plan()
-    clearer, sturdier = wide.clearer(first), wide.sturdier(first)
-    plans = [*_if_found(lean.hurried.plan), *clearer.plans, *sturdier.plans[1:]]
+    clearer = _in_time(first, lambda: wide.clearer(first)).plans
+    sturdier = _in_time(first, lambda: wide.sturdier(first)).plans
+    plans = [*_if_found(lean.hurried.plan), *clearer, *sturdier[1:]]
     whole = max(map(drawn_length, plans)) - TOLERANCES.joint_centre
     plans = _different([plan for plan in plans if drawn_length(plan) >= whole])
-    best = max(plans, key=lambda plan: wide.survived(plan.centres))
+    try:
+        best = max(plans, key=lambda plan: wide.survived(plan.centres))
+    except OutOfTime:
+        return plans[-1]
     return replace(best, rivals=tuple(plan for plan in plans if plan is not best))
 
 
@@ -135,6 +140,14 @@ def _different(plans: list[Plan]) -> list[Plan]:
         for k, plan in enumerate(plans)
         if not any(np.array_equal(moves[k], before) for before in moves[:k])
     ]
+
+
+def _in_time(first: Plan, better: Callable[[], Widest]) -> Widest:
+    """Better plans, the first alone where the time is over before any is looked for."""
+    try:
+        return better()
+    except OutOfTime:
+        return Widest([first], np.inf, in_time=False)
 
 
 def _if_found(plan: Callable[[], Plan]) -> list[Plan]:
@@ -259,14 +272,14 @@ class _Search:
         """What was found, smoothed and row by row."""
         assert outcome.found is not None
         problem, judge = self.problem, outcome.judge
-        arm, clearance = problem.manipulator, clearance.hurried(IMPROVE_SHARE)
-        corners = self._smoothed(clearance, outcome)
+        arm, corners = problem.manipulator, self._smoothed(clearance, outcome)
         turn = problem.planned_row_change
         rows = dense_rows(arm, corners, problem.path.spacing, turn, judge.slack)
         alpha, theta = joint_angles(arm, rows.centres)
         # Proofs of what is needed ask no more than whether there is the clearance
         # required.
         enough = clearance.bare.up_to(problem.required_clearance)
+        enough = enough.hurried(IMPROVE_SHARE)
         stations, on_path = _stations(corners, rows)
         trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
         return Plan(
@@ -281,7 +294,7 @@ class _Search:
     def _smoothed(self, clearance: BroadPhase, outcome: Explored) -> Corners:
         """What was found, shorter and with fewer knees, as far as there is time."""
         assert outcome.found is not None
-        judge = outcome.judge.until(clearance.deadline)
+        judge = outcome.judge.until(clearance.deadline.share(IMPROVE_SHARE))
         corners = outcome.found.corners
         grown = not isinstance(outcome.found, Searched)
         # What is straighter has more knees to spare. A roadmap has few but for an aim.

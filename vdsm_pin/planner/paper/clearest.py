@@ -40,8 +40,10 @@ def plan_paper_clearest(
     if not problem.scene.obstacles:
         return replace(first, strategy=name)
     kept = problem.required_clearance + np.max(margin)
-    low = float(clearance(first.centres).min()) - kept
-    high = float(clearance(first.centres[:1]).min()) - kept
+    low, high = (
+        float(clearance(centres).min()) - kept
+        for centres in (first.centres, first.centres[:1])
+    )
     hurried = with_share(clearance, IMPROVE_SHARE)
     made = [(0.0, first)]
 
