@@ -1,5 +1,6 @@
 """What a robot is read as: groups, bases, limits, covers; Pinocchio agrees."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -152,6 +153,38 @@ def test_another_element_of_a_collision_is_noted(tmp_path: Path) -> None:
     text = URDF.replace("<collision>", "<collision><pose>1 0 0 0 0 0</pose>")
     notes = read_robot(RobotFiles(write(tmp_path, "odd.urdf", text))).notes
     assert [note for note in notes if note.startswith("<pose> of links is not read: ")]
+
+
+@pytest.mark.parametrize(
+    ("right", "slip", "told"),
+    [
+        ("multiplier=", "multiplyer=", "<mimic> has 'multiplyer'; is 'multiplier' m"),
+        ("offset=", "Offset=", "<mimic> has 'Offset'; is 'offset' meant"),
+        ("velocity=", "velocty=", "<limit> has 'velocty'; is 'velocity' meant"),
+        ("velocity=", "deceleration=", ""),
+        ("velocity=", "gear_velocity=", ""),
+    ],
+)
+def test_a_misspelt_attribute_is_refused(
+    tmp_path: Path, right: str, slip: str, told: str
+) -> None:
+    """It would count as left out: a mimic has a ratio of 1 then, a limit is none."""
+    assert right in URDF
+    file = write(tmp_path, "slip.urdf", URDF.replace(right, slip, 1))
+    if not told:
+        read_robot(RobotFiles(file))
+        return
+    with pytest.raises(InvalidFile, match=told):
+        read_robot(RobotFiles(file))
+
+
+@pytest.mark.parametrize("name", ["Scale", "scales"])
+def test_a_misspelt_scale_of_a_mesh_is_refused(tmp_path: Path, name: str) -> None:
+    """Only a mesh far too large is told apart by its size."""
+    mesh = f'<mesh filename="none.stl" {name}="2 2 2"/>'
+    text = re.sub(r"<(box|cylinder|sphere) [^>]*>", mesh, URDF, count=1)
+    with pytest.raises(InvalidFile, match=f"<mesh> has '{name}'; is 'scale' meant"):
+        read_robot(RobotFiles(write(tmp_path, "slip.urdf", text)))
 
 
 MOVES = """<robot name="r"><link name="w"><collision><geometry><sphere radius="1"/>

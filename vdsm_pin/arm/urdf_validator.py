@@ -57,6 +57,20 @@ KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Elements that others may have, of which a misspelt one would be passed over."""
 
+ATTRIBUTES: Final[Mapping[str, tuple[str, ...]]] = {
+    "mimic": ("joint", "multiplier", "offset"),
+    "limit": (
+        *("lower", "upper", "effort", "velocity"),
+        *("acceleration", "deceleration", "jerk"),
+    ),
+    "mesh": ("filename", "scale"),
+}
+"""Attributes of which one counts as left out where it is misspelt."""
+
+ALIKE: Final = 0.85
+"""From here on an attribute is taken for another one misspelt: `gear_velocity`, which
+some have besides `velocity`, is not; [-]."""
+
 
 def validate_urdf(text: str, *, geometry_only: bool = False) -> ET.Element:
     """Refuse a URDF document with any defect that a reader might let pass.
@@ -143,6 +157,7 @@ def _joint_faults(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     kind = joint.get("type", "")
     yield from _repeated(joint, where)
     yield from _misspelt(joint, where)
+    yield from _misspelt_attributes(joint, where)
     kinds = ANY_JOINT_KINDS if geometry_only else JOINT_KINDS
     if kind not in kinds:
         yield f"{where}: type {kind!r}, expected one of {', '.join(kinds)}"
@@ -169,6 +184,15 @@ def _misspelt(element: ET.Element, where: str) -> Iterator[str]:
     for tag in unknown_elements(element):
         if meant := get_close_matches(tag.lower(), KNOWN[element.tag], 1, 0.7):
             yield f"{where}: <{tag}> is not read by anybody; is <{meant[0]}> meant?"
+
+
+def _misspelt_attributes(element: ET.Element, where: str) -> Iterator[str]:
+    for one in element.iter():
+        known = ATTRIBUTES.get(one.tag, ())
+        for name in one.attrib:
+            meant = get_close_matches(name.lower(), known, 1, ALIKE)
+            if meant and name not in known:
+                yield f"{where}: <{one.tag}> has {name!r}; is {meant[0]!r} meant?"
 
 
 def _limit_faults(joint: ET.Element, where: str, optional: bool) -> Iterator[str]:
@@ -207,6 +231,7 @@ def _link_faults(link: ET.Element, geometry_only: bool) -> Iterator[str]:
     for shape in shown + link.findall("collision"):
         yield from _repeated(shape, where)
         yield from _misspelt(shape, f"{shape.tag} of {where}")
+        yield from _misspelt_attributes(shape, where)
         yield from _origin_faults(shape, where)
         yield from _shape_faults(shape, where, sizes)
 
