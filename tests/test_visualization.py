@@ -89,7 +89,7 @@ def test_a_robot_is_shown_with_its_motion_or_where_it_begins(tmp_path: Path) -> 
     urdf.write_text(low, encoding="utf-8")
     shown = drawing(read_problem_or_cell(problem), None)
     names = [joint.name for joint in shown.problem.robot.joints]  # type: ignore
-    q = shown.trajectory.knots  # type: ignore[attr-defined]
+    q = shown.trajectory.q  # type: ignore[attr-defined]
     assert low != text and q.tolist() == [[0.5, *[0.0] * (len(names) - 1)]]
     assert drawing(read_problem_or_cell(problem), problem.parent / "plan.csv")
     write_page(tmp_path / "v.html", str(problem), problem.parent / "plan.csv")
@@ -106,7 +106,7 @@ def test_a_robot_whose_joints_all_stand_is_shown(tmp_path: Path) -> None:
     )
     urdf.write_text(text, encoding="utf-8")
     shown = drawing(read_problem_or_cell(tmp_path / "cell" / "problem.yaml"), None)
-    assert shown.trajectory.knots.shape == (1, 0)  # type: ignore[attr-defined]
+    assert shown.trajectory.q.shape == (1, 0)  # type: ignore[attr-defined]
 
 
 def test_a_changed_file_is_noticed_and_a_broken_one_explained(tmp_path: Path) -> None:
