@@ -17,7 +17,7 @@ from vdsm_pin.planner.upper_clearance import feed_culprit
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
 
-FINE: Final = 1e-6
+END_WITHIN: Final = 1e-6
 """How far beyond the place where it comes too near the rail may end; [m]."""
 
 
@@ -63,7 +63,7 @@ def _last_place(
         return None
     if feed_culprit(problem, start).clearance < required:
         return None
-    while abs(end - clear) > FINE:
+    while abs(end - clear) > END_WITHIN:
         middle = (clear + end) / 2.0
         near = feed_culprit(problem, start, middle)
         if near.clearance < required:

@@ -57,7 +57,7 @@ EXPLAIN_SHARE: Final = 0.1
 """Part of the time that is left to tell what stopped a search; [-]."""
 EXPLAIN_MOST: Final = 4.0
 """The longest time left for that; [s]."""
-FINE: Final = 0.004
+BETTER_BY: Final = 0.004
 """Plans are made better until this part of what is best at most is left; [-]."""
 FEWEST: Final = CostWeights()
 CLEAREST: Final = CostWeights(angle=0.2, clearance=0.064, clearance_cost=8.0)
@@ -321,7 +321,9 @@ class _Search:
         low = float(self.kept(first.centres).min()) - self.clearance_kept
         start = float(self.kept(first.centres[:1]).min())
         high = min(self._clearance_at_tips(first), start) - self.clearance_kept
-        return widest(self.hurried.with_reserve, first, low, high, until=FINE * high)
+        return widest(
+            self.hurried.with_reserve, first, low, high, until=BETTER_BY * high
+        )
 
     def sturdier(self, first: Plan) -> Widest:
         """Plans whose links keep what larger and larger joint errors use up; [rad]."""
@@ -330,7 +332,7 @@ class _Search:
         most = self._clearance_at_tips(first) - self.clearance_kept
         high = min(most / reach, high)
         better = self.hurried.with_joint_error
-        return widest(better, first, low, high, until=FINE * high)
+        return widest(better, first, low, high, until=BETTER_BY * high)
 
     def survived(self, centres: FloatArray) -> float:
         """Error of all joints that configurations have room for, roughly; [rad]."""
