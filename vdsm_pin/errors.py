@@ -82,7 +82,12 @@ class InvalidFile(InvalidInput):
     def __str__(self) -> str:
         """The message, and how many more there are."""
         more = f" (and {len(self.others)} more)" if self.others else ""
-        return super().__str__() + more
+        return self.alone + more
+
+    @property
+    def alone(self) -> str:
+        """The message without the number of others, for who tells them all."""
+        return super().__str__()
 
 
 class CannotWrite(InvalidFile):

@@ -572,6 +572,7 @@ def test_a_command_tells_every_error_of_a_file(
     lines = capsys.readouterr().err.splitlines()
     places = [line.split(": ")[2].split(" (line")[0] for line in lines]
     assert ended.value.code == 2
+    assert not [line for line in lines if line.endswith("more)")]
     points = [f"tip_path.points[{k}]" for k in range(30)]
     others = {"length_unit", "obstacles[0].radius", "required_clearance"}
     assert sorted(places) == sorted([*points, *others])

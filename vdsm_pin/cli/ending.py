@@ -20,7 +20,8 @@ def fail(error: Exception, status: int) -> NoReturn:
     with suppress(OSError):  # of a disk that is full, say; the status still tells
         between = "\n  " if sys.stderr.isatty() else "; "
         for one in (error, *getattr(error, "others", ())):
-            typer.echo(printable(f"vdsm: {one}").replace("; ", between), err=True)
+            told = getattr(one, "alone", one)
+            typer.echo(printable(f"vdsm: {told}").replace("; ", between), err=True)
     sys.exit(status)
 
 
