@@ -187,6 +187,29 @@ def test_a_misspelt_scale_of_a_mesh_is_refused(tmp_path: Path, name: str) -> Non
         read_robot(RobotFiles(write(tmp_path, "slip.urdf", text)))
 
 
+@pytest.mark.parametrize(
+    ("line", "meant"),
+    [
+        ('<virtual_jiont name="v" type="planar" child_link="x"/>', "virtual_joint"),
+        ('<disable_collision link1="x" link2="y"/>', "disable_collisions"),
+        ('<group name="arm"><chian base_link="x" tip_link="y"/></group>', "chain"),
+        ('<group_stat name="home" group="arm"/>', "group_state"),
+        ('<passive_joint name="j"/><rviz/>', ""),
+    ],
+)
+def test_a_misspelt_element_of_a_srdf_is_refused(
+    tmp_path: Path, line: str, meant: str
+) -> None:
+    """Passed over, the base stands or a group is empty."""
+    srdf = write(tmp_path, "r.srdf", f'<robot name="r">{line}</robot>')
+    files = RobotFiles(write(tmp_path, "r.urdf", URDF), srdf)
+    if not meant:
+        read_robot(files)
+        return
+    with pytest.raises(InvalidFile, match=f"not read by anybody; is <{meant}> meant"):
+        read_robot(files)
+
+
 MOVES = """<robot name="r"><link name="w"><collision><geometry><sphere radius="1"/>
   </geometry></collision></link><link name="a"/><link name="b"/>
   <joint name="turn" type="continuous"><parent link="w"/><child link="a"/></joint>

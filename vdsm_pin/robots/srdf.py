@@ -1,8 +1,9 @@
 """A SRDF: pairs that need not be held apart, groups of joints, how the robot stands."""
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Final, Literal, TypeAlias, cast
@@ -13,6 +14,16 @@ from vdsm_pin.io.xml_reader import end, read_xml
 from vdsm_pin.text import listed
 
 MAX_BYTES: Final = 16 << 20
+
+KNOWN: Final = {
+    "robot": (
+        *("group", "group_state", "end_effector", "virtual_joint", "passive_joint"),
+        *("disable_collisions", "enable_collisions", "disable_default_collisions"),
+        *("link_sphere_approximation", "joint_property"),
+    ),
+    "group": ("group", "link", "joint", "chain"),
+}
+"""Elements that others may have, of which a misspelt one would be passed over."""
 
 BaseKind: TypeAlias = Literal["planar", "floating"]
 
@@ -50,6 +61,8 @@ class Srdf:
         if self._root.find("joint/parent") is not None:
             fault = "is a URDF, with joints between links; expected a SRDF"
             raise self._invalid(fault)
+        for within in (self._root, *self._root.iter("group")):
+            self._check_spelling(within, KNOWN[within.tag])
         self._links = {link.get("name", "") for link in robot.findall("link")}
         self._joints = {
             joint.get("name", ""): joint for joint in robot.findall("joint")
@@ -58,6 +71,17 @@ class Srdf:
 
     def _invalid(self, fault: str) -> InvalidFile:
         return InvalidFile(file=self._path, fault=fault)
+
+    def _check_spelling(self, within: ET.Element, known: Sequence[str]) -> None:
+        """Refuse an element that looks like another one misspelt.
+
+        What moves the base, or who is of a group, would be left out.
+        """
+        for tag in (one.tag for one in within if isinstance(one.tag, str)):
+            meant = get_close_matches(tag.lower(), known, 1, 0.7)
+            if meant and tag not in known:
+                fault = f"<{tag}> is not read by anybody; is <{meant[0]}> meant?"
+                raise self._invalid(fault)
 
     def disabled(self) -> dict[frozenset[str], str]:
         """Pairs of links that it does not hold apart, with its reason."""
