@@ -210,6 +210,23 @@ def test_a_misspelt_element_of_a_srdf_is_refused(
         read_robot(files)
 
 
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [("has_velocity_limit", True), ("has_Velocity_limits", True), ("has_jerk", False)],
+)
+def test_a_misspelt_word_of_moveits_limits_is_refused(
+    tmp_path: Path, key: str, told: bool
+) -> None:
+    """The limit beside it would not count."""
+    text = f"joint_limits:\n  turn: {{{key}: true, max_velocity: 0.5}}\n"
+    file = write(tmp_path, "limits.yaml", text)
+    if not told:
+        assert read_limits(file)["turn"].velocity == np.inf
+        return
+    with pytest.raises(InvalidFile, match=f"{key}'; is 'has_velocity_limits' meant"):
+        read_limits(file)
+
+
 MOVES = """<robot name="r"><link name="w"><collision><geometry><sphere radius="1"/>
   </geometry></collision></link><link name="a"/><link name="b"/>
   <joint name="turn" type="continuous"><parent link="w"/><child link="a"/></joint>

@@ -6,6 +6,7 @@ A joint that moves is held to its own, and to those of joints that mimic it.
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
@@ -18,6 +19,12 @@ from vdsm_pin.robots.model import RobotJoint, Values
 from vdsm_pin.tolerances import TOLERANCES
 
 MAX_BYTES: Final = 4 << 20
+HAS: Final = tuple(
+    f"has_{kind}_limits"
+    for kind in ("position", "velocity", "acceleration", "deceleration", "jerk", "soft")
+)
+"""Of a joint in a joint_limits.yaml; misspelt it would count as left out."""
+
 ONE_VALUE: Final = "revolute", "continuous", "prismatic"
 """Types of joints that can mimic another."""
 
@@ -146,6 +153,11 @@ def read_limits(path: Path) -> dict[str, Limits]:
 
 
 def _limits(joint: Place) -> Limits:
+    for key in joint.keys():
+        meant = get_close_matches(str(key).lower(), HAS, 1, 0.9)
+        if meant and key not in HAS:
+            fault = f"has {key!r}; is {meant[0]!r} meant?"
+            raise joint.invalid(fault)
     found = Limits(velocity=_most(joint, "velocity"))
     found = replace(found, acceleration=_most(joint, "acceleration"))
     if _has(joint, "position"):
