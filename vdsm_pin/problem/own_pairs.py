@@ -5,6 +5,7 @@ bodies that many links in line are between need the arm to turn far for that, so
 of how far it must turn spares most postures a look.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, sin, sqrt
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -153,32 +154,29 @@ class OwnPairs:
         """Those of a problem's arm, with what it requires and errors take."""
         arm, bodies = problem.manipulator, problem.manipulator.convex_bodies
         angles = problem.errors.angles(arm.n_links)
-        turns, found = np.hypot(angles[:, 0], angles[:, 1]), []
-        for i, k in arm.self_pairs.held.tolist():
-            near, far = bodies[i], bodies[k]
-            levers = _levers(arm.link_lengths, near, far)
-            kept = problem.required_self_clearance + float(levers @ turns)
-            turn = _least_turn(arm.link_lengths, near, far, kept + _reserve(problem))
-            if turn <= (far.link - near.link) * arm.max_link_angle:
-                found.append((i, k, kept, turn, levers))
+        turns, held = np.hypot(angles[:, 0], angles[:, 1]), arm.self_pairs.held
+        levers = np.array(
+            [_levers(arm.link_lengths, bodies[i], bodies[k]) for i, k in held.tolist()]
+        ).reshape(-1, arm.n_links)
+        kept = problem.required_self_clearance + levers @ turns
+        least = _least_turns(arm.link_lengths, bodies, held, kept + _reserve(problem))
+        links = np.array([body.link for body in bodies])
+        apart = links[held[:, 1]] - links[held[:, 0]]
+        near = least <= apart * arm.max_link_angle
         discs = np.array([[*_axis(body), body.disc] for body in bodies])
         pairs = Pairs(
             pieces=pack_pieces([[body.piece] for body in bodies]),
             corners=np.concatenate([body.corners for body in bodies]),
             first=np.cumsum([0, *(len(body.corners) for body in bodies)]),
-            links=np.array([body.link for body in bodies]),
+            links=links,
             discs=discs,
             balls=np.array([body.ball for body in bodies]),
             spheres=np.array([_sphere(body) for body in bodies]),
-            both=np.array([one[:2] for one in found], np.int64).reshape(-1, 2),
+            both=held[near],
             lengths=np.append(0.0, arm.link_lengths),
         )
-        return cls(
-            pairs,
-            np.array([one[2] for one in found]),
-            np.array([one[4] for one in found]).reshape(-1, arm.n_links),
-            min((one[3] for one in found), default=np.inf),
-        )
+        turn = float(least[near].min(initial=np.inf))
+        return cls(pairs, kept[near], levers[near], turn)
 
     def spare(self, alpha: FloatArray, theta: FloatArray) -> FloatArray:
         """What pairs have beyond what they keep, at least, shape (r, p); [m].
@@ -220,21 +218,44 @@ def _levers(lengths: FloatArray, near: ArmBody, far: ArmBody) -> FloatArray:
     return levers
 
 
-def _least_turn(lengths: FloatArray, near: ArmBody, far: ArmBody, kept: float) -> float:
-    """A turn of the arm from one body to the other below which they stay apart; [rad].
+def _reach(body: ArmBody, begin: float, sign: float) -> FloatArray:
+    """How far a body reaches at most along a direction within each of `TURNS` / 2.
+
+    Args:
+        body: The body.
+        begin: Where its link is counted from, along it; [m].
+        sign: 1 for a direction ahead along the link, -1 for one back.
+
+    Returns:
+        Shape (t,); [m].
+    """
+    corners = body.corners
+    x, y = sign * (corners[:, 0] - begin), np.hypot(corners[:, 1], corners[:, 2])
+    most = np.minimum(np.arctan2(y, x), TURNS[:, None] / 2.0)
+    reach = (x * np.cos(most) + y * np.sin(most)).max(axis=1)
+    return np.asarray(reach + body.disc + body.ball)
+
+
+def _least_turns(
+    lengths: FloatArray, bodies: Sequence[ArmBody], held: IntArray, kept: FloatArray
+) -> FloatArray:
+    """Turns of the arm between two bodies up to which they stay apart, (p,); [rad].
 
     Where links turn by t in all, each is within t / 2 of the direction half-way. Along
     that the near body ends, links go on, and the far one begins.
+
+    Args:
+        lengths: Of the links, shape (N,); [m].
+        bodies: Those of the arm.
+        held: Numbers of two of them, shape (p, 2).
+        kept: How far apart they are to stay, shape (p,); [m].
     """
-    half = TURNS / 2.0
-    length = lengths[near.link - 1] if near.link else 0.0
-    begin, end = near.corners, far.corners
-    ahead = begin[:, 0] - length, np.hypot(begin[:, 1], begin[:, 2])
-    back = -end[:, 0], np.hypot(end[:, 1], end[:, 2])
-    gap = lengths[near.link : far.link - 1].sum() * np.cos(half) - kept
-    for (x, y), body in ((ahead, near), (back, far)):
-        most = np.minimum(np.arctan2(y, x), half[:, None])
-        reach = (x * np.cos(most) + y * np.sin(most)).max(axis=1)
-        gap -= reach + body.disc + body.ball
-    meets = gap <= 0.0
-    return float(TURNS[int(np.argmax(meets))]) if meets.any() else float(TURNS[-1])
+    near, far = held.T
+    ends = np.append(0.0, lengths)
+    ahead = np.array([_reach(body, ends[body.link], 1.0) for body in bodies])
+    back = np.array([_reach(body, 0.0, -1.0) for body in bodies])
+    links, along = np.array([body.link for body in bodies]), np.cumsum(ends)
+    between = along[links[far] - 1] - along[links[near]]
+    gap = between[:, None] * np.cos(TURNS / 2.0) - ahead[near] - back[far]
+    apart = np.logical_and.accumulate(gap > kept[:, None], axis=1).sum(axis=1)
+    return np.asarray(TURNS[np.maximum(apart - 1, 0)])
