@@ -29,6 +29,7 @@ from vdsm_pin.planner.fewest.strategy import (
     plan_sturdiest,
 )
 from vdsm_pin.planner.largest_margin import drawn_length, widest
+from vdsm_pin.planner.paper.clearest import plan_paper_clearest
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -69,7 +70,16 @@ def planned(planner: Planner, task: PlanningProblem, last: float) -> Plan | None
         return None
 
 
-@pytest.mark.parametrize("planner", [plan_fewest, plan_clearest])
+def plan_paper_measured(
+    problem: PlanningProblem, clearance: LinkClearance, margin: float
+) -> Plan:
+    """With a measure that finds nothing missing: the widest is made once more."""
+    return plan_paper_clearest(problem, clearance, margin, lambda *_: ())
+
+
+@pytest.mark.parametrize(
+    "planner", [plan_fewest, plan_clearest, plan_paper_clearest, plan_paper_measured]
+)
 def test_more_time_never_loses_a_plan(planner: Planner) -> None:
     task = corner("obs1")
     counted = Counted(link_clearance(task))

@@ -3,12 +3,14 @@
 "The path is planned as far from the surface as possible" (section 4.2).
 """
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.planner.largest_margin import IMPROVE_SHARE, widest
+from vdsm_pin.errors import Infeasible, OutOfTime
+from vdsm_pin.planner.largest_margin import IMPROVE_SHARE, drawn_length, widest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import (
     UNMEASURED,
@@ -59,7 +61,12 @@ def plan_paper_clearest(
         rounds=ROUNDS,
         until=TOLERANCES.widest_region,
     )
-    # The widest of them is made once more, Coal measuring.
-    more = next(reserve for reserve, plan in made if plan is found.plans[-1])
-    plan = plan_paper(problem, clearance, margin + more, measure)
+    plan = found.plans[-1]
+    if measure is not UNMEASURED:
+        # The widest of them once more, Coal measuring; else it stays as it is.
+        more = next(reserve for reserve, one in made if one is plan)
+        with suppress(Infeasible, OutOfTime):
+            steered = plan_paper(problem, clearance, margin + more, measure)
+            if drawn_length(steered) >= drawn_length(plan) - TOLERANCES.joint_centre:
+                plan = steered
     return replace(plan, strategy=name, notes=(*plan.notes, found.told(kept)))
