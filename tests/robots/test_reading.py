@@ -234,13 +234,23 @@ MOVES = """<robot name="r"><link name="w"><collision><geometry><sphere radius="1
 
 
 @pytest.mark.parametrize("kind", ["continuous", "planar", "floating"])
-@pytest.mark.parametrize(("ends", "noted"), [((-2, 2), True), ((0, 0), False)])
+@pytest.mark.parametrize(
+    ("ends", "noted"),
+    [
+        ('lower="-2" upper="2"', True),
+        ('upper="2"', True),
+        ('lower="-2"', True),
+        ('lower="1" upper="1"', True),
+        ('lower="0" upper="0"', False),
+        ("", False),
+    ],
+)
 def test_limits_that_a_type_of_joint_has_not_are_noted(
-    tmp_path: Path, kind: str, ends: tuple[int, int], noted: bool
+    tmp_path: Path, kind: str, ends: str, noted: bool
 ) -> None:
     """Values beyond them are not refuted; a velocity is judged of any type."""
-    limit = '<axis xyz="0 0 1"/><limit lower="{}" upper="{}" velocity="3" effort="1"/>'
-    text = MOVES.format(kind, limit.format(*ends))
+    limit = '<axis xyz="0 0 1"/><limit {} velocity="3" effort="1"/>'
+    text = MOVES.format(kind, limit.format(ends))
     robot = read_robot(RobotFiles(write(tmp_path, "moves.urdf", text)))
     assert any("none are not judged: 'base'" in note for note in robot.notes) is noted
     assert not np.isfinite([joint.upper for joint in robot.joints]).any()

@@ -110,8 +110,8 @@ def _limits_not_meant(document: ET.Element) -> Iterator[str]:
     for joint in document.findall("joint"):
         limit = joint.find("limit")
         if limit is not None and joint.get("type") in UNLIMITED:
-            lower, upper = (plain_number(limit.get(k, "")) for k in ("lower", "upper"))
-            if lower < upper:
+            ends = (plain_number(limit.get(k, "0")) for k in ("lower", "upper"))
+            if any(end != 0.0 for end in ends):  # some write 0 and 0 for none
                 yield joint.get("name", "")
 
 
