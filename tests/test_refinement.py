@@ -286,3 +286,13 @@ def test_an_approach_that_is_not_read_is_told(
         said = [note for note in notes if "is not read" in note]
         assert len(said) == bool(why and approach is not Approach.SHORTEST)
         assert all(why in note and repr(approach.value) in note for note in said)
+
+
+def test_a_motion_that_was_clear_is_measured_again_where_more_is_asked() -> None:
+    problem = short("obs3")
+    measure = CoalMeasure(problem)
+    motion = plan_paper(problem, link_clearance(problem), 0.0).trajectory
+    assert measure(motion) == ()
+    more = measure(motion, 0.010)
+    assert more and all(one.distance < 0.0135 for one in more)
+    assert measure(motion) == ()

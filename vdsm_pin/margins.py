@@ -43,7 +43,7 @@ class CoalMeasure:
 
     def __init__(self, problem: PlanningProblem, deadline: Deadline = NO_LIMIT) -> None:
         self._problem, self._deadline = problem, deadline
-        self._clear: Trajectory | None = None
+        self._clear: tuple[Trajectory, FloatArray] | None = None
 
     @cached_property
     def _arm(self) -> CoalArm:
@@ -66,10 +66,11 @@ class CoalMeasure:
         Raises:
             OutOfTime: If the time is over.
         """
-        if trajectory is self._clear:  # it keeps this and maybe more
-            return ()
         problem, worst = self._problem, dict[tuple[int, int], tuple[float, int, int]]()
         asked = problem.required_clearance + margin_table(problem, margin)
+        if self._clear and self._clear[0] is trajectory:
+            if (asked <= self._clear[1]).all():
+                return ()
         room = NEAR * problem.manipulator.most_radius
         room += float(np.max(margin, initial=0.0))
         arm, pairs = self._arm, self._arm.pairs
@@ -82,7 +83,7 @@ class CoalMeasure:
                 if key not in worst or told < worst[key][0]:
                     worst[key] = told, int(found.moment[k]), int(found.pair[k])
         if not worst:
-            self._clear = trajectory
+            self._clear = trajectory, asked
         return tuple(
             Miss(row, link + 1, obstacle, told, *arm.witness(trajectory, row, pair))
             for (link, obstacle), (told, row, pair) in sorted(worst.items())
