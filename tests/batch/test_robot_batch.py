@@ -108,6 +108,7 @@ def test_a_problem_of_a_folder_of_its_own_is_named_after_that(folder: Path) -> N
     assert f'href="{row.folder}/report.html"' in (folder / "out/index.html").read_text()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_endings_may_be_large(folder: Path) -> None:
     for path in (folder / "plans").iterdir():
         path.rename(path.with_suffix(".CSV"))

@@ -162,9 +162,17 @@ obstacle, shape (N, n_obstacles); [m]."""
 
 
 def margin_table(problem: PlanningProblem, margin: Margin) -> FloatArray:
-    """A margin for each link and obstacle, shape (N, n_obstacles); [m]."""
+    """A margin for each link and obstacle, shape (N, n_obstacles); [m].
+
+    Raises:
+        ValueError: If it is neither one number nor such a table.
+    """
+    table = np.asarray(margin, dtype=np.float64)
     shape = problem.manipulator.n_links, len(problem.scene.obstacles)
-    return np.broadcast_to(np.asarray(margin, dtype=np.float64), shape)
+    if table.shape not in ((), shape):
+        message = f"margins of shape {table.shape}, expected one number or {shape}"
+        raise ValueError(message)
+    return np.broadcast_to(table, shape)
 
 
 class Measure(Protocol):

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 TURNS: Final = np.deg2rad(np.arange(181.0))
 """Turns of the arm from one body to the other that are tried for the least; [rad]."""
+RESERVE: Final = 1e-4
+"""What planners may keep between own bodies besides, over the arm's length; [-]."""
 WIDTH: Final = TOLERANCES.planned_clearance
 PART: Final = 0.05
 """How far distances may be below the true ones: so much [m], or this part of them."""
@@ -191,7 +193,7 @@ class OwnPairs:
 
 def _reserve(problem: "PlanningProblem") -> float:
     """What planners may keep besides, at most; [m]."""
-    return TOLERANCES.planned_reserve * problem.manipulator.total_length
+    return RESERVE * problem.manipulator.total_length
 
 
 def _axis(body: ArmBody) -> FloatArray:

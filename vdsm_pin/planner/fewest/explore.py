@@ -195,7 +195,7 @@ class _Exploration:
             if now.beats(self.best):
                 self.best = now
             self.best = replace(self.best, stuck=now.stuck)
-            if isinstance(level, Insert) and self._may_have_fewer_knees():
+            if isinstance(level, Insert) and self._takes_many_knees():
                 self.levels = (BESIDE,)
                 yield self.best
                 continue
@@ -237,8 +237,11 @@ class _Exploration:
         LOG.debug("%s: %.4f m missing", level, now.missing)
         return now
 
-    def _may_have_fewer_knees(self) -> bool:
-        """Whether a roadmap may draw with fewer knees what an insertion draws whole."""
+    def _takes_many_knees(self) -> bool:
+        """Whether a roadmap may draw with fewer knees what an insertion draws whole.
+
+        As many as can be are taken away from it first.
+        """
         untried = BESIDE in self.levels and self.room.one_knee_draws
         if self.best.missing > 0.0 or not untried:
             return False
