@@ -21,6 +21,7 @@ from vdsm_pin.planner.records import (
     Margin,
     Measure,
     Plan,
+    margin_table,
 )
 from vdsm_pin.planner.spacing import STRAYS, row_steps, stepped
 from vdsm_pin.planner.start import check_start, start_centres
@@ -43,14 +44,17 @@ def plan_follow_the_leader(
     Args:
         problem: What is asked.
         clearance: Clearance of links at given joint centres.
-        margin: Not read: there is one such motion.
-        measure: Not read either.
+        margin: Above 0 where this motion was found too near: there is no other.
+        measure: Not read.
 
     Raises:
         Infeasible: If the start is too close to an obstacle, or `NoPlanFound` where a
-            joint or the base would pass a limit.
+            joint or the base would pass a limit, or a margin is asked for.
     """
     check_start(problem, clearance)
+    if margin_table(problem, margin).any():
+        message = "the arm can follow its tip in one way alone, which comes too near"
+        raise NoPlanFound(message)
     arm, rows = problem.manipulator, path_rows(problem.path)
     start = start_centres(problem)
     way = np.vstack([start[-1:], problem.path.insertion, rows.tips[:1]])
