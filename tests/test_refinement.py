@@ -81,11 +81,9 @@ def test_a_plan_that_cannot_be_certified_is_not_handed_out(
 ) -> None:
     """A planner that ignores the obstacle and the margin never gets through."""
 
-    def blind(
-        problem: PlanningProblem, clearance: LinkClearance, margin: Margin, *_: Any
-    ) -> Plan:
+    def blind(problem: PlanningProblem, clearance: LinkClearance, *_: Any) -> Plan:
         free = replace(problem, scene=read_problem("paper/free").scene)
-        return plan_paper(free, clearance, margin)
+        return plan_paper(free, clearance, 0.0)
 
     monkeypatch.setattr(refinement, "strategy", lambda name: blind)
     problem = short("obs3")
@@ -108,11 +106,9 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
     task = short("obs3")
     free = replace(task, scene=read_problem("paper/free").scene)
 
-    def boasting(
-        problem: PlanningProblem, clearance: LinkClearance, margin: Margin, *_: Any
-    ) -> Plan:
+    def boasting(problem: PlanningProblem, clearance: LinkClearance, *_: Any) -> Plan:
         lean, wide = (plan_fewest(problem, clearance, m) for m in (0.0, 0.03))
-        blind = replace(plan_fewest(free, clearance, margin), problem=problem)
+        blind = replace(plan_fewest(free, clearance, 0.0), problem=problem)
         return replace(blind, rivals=(lean, wide))
 
     monkeypatch.setattr(refinement, "strategy", lambda name: boasting)
