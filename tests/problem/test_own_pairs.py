@@ -11,8 +11,9 @@ from vdsm_pin.arm.mounted import Feed, LinkBody
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.row_bounds import link_gaps
 from vdsm_pin.geometry.solids import Box, Cylinder
+from vdsm_pin.planner.fewest.levels import THOROUGH
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.own_pairs import PART, WIDTH
+from vdsm_pin.problem.own_pairs import PART, RESERVE, WIDTH
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 
@@ -138,3 +139,34 @@ def test_what_errors_take_is_kept() -> None:
 def test_plain_arms_are_looked_at_only_where_they_curl() -> None:
     own = problem(HRM8).own_pairs
     assert own.turn > np.pi / 2.0
+
+
+def test_a_pair_that_just_comes_too_near_at_the_limit_is_looked_at() -> None:
+    """Boxes whose edges meet at 42.1 deg between their links, of 42.5 that are allowed.
+
+    They were taken to stay apart up to 43 deg, the first whole degree at which not.
+    """
+    d = 0.2 * np.tan(np.deg2rad(42.1) / 2.0) + 2e-4
+    half = np.array([0.02, 0.2, 0.004])
+    ahead = HRM8.link_lengths[2] - d - half[0]
+    arm = replace(
+        HRM8,
+        link_radius=0.005,
+        bodies=(
+            LinkBody(3, Box("cuff", np.array([ahead, 0.0, 0.0]), np.eye(3), half)),
+            LinkBody(4, Box("ring", np.array([d + half[0], 0, 0]), np.eye(3), half)),
+        ),
+    )
+    own = problem(arm, required_self_clearance=0.0).own_pairs
+    names = [body.name for body in arm.convex_bodies]
+    pairs = [{names[one], names[other]} for one, other in own.pairs.both.tolist()]
+    alpha, none = np.zeros((1, 8)), np.zeros((1, 8))
+    alpha[0, 3] = np.deg2rad(42.49)
+    assert own.spare(alpha, none)[0, pairs.index({"cuff", "ring"})] < 0.0
+    assert own.turn <= alpha[0, 3]
+
+
+def test_what_is_not_looked_at_keeps_what_planners_keep_for_moves_between_rows() -> (
+    None
+):
+    assert RESERVE >= max(level.slack for level in THOROUGH)
