@@ -127,7 +127,10 @@ class PlanFile(ResultModel):
     notes: tuple[str, ...] = Field(
         description=f"what the strategy has to say; {_NOTES}"
     )
-    rounds: int = Field(description="rounds of plan, measure, verify, larger margins")
+    rounds: int = Field(
+        description="rounds of plan, measure, verify, larger margins; a lift after "
+        "which joints were moved on is one too"
+    )
     adjustments: tuple[AdjustmentRow, ...] = Field(
         default=(),
         description="what was missed after each round: margins raised, joints moved",

@@ -306,10 +306,14 @@ class AdjustmentRow(ResultModel):
         description="Coal at a waypoint, or the proof over an interval"
     )
     distance_m: FiniteFloat | None = Field(description="what it found")
-    margin_m: FiniteFloat = Field(
+    margin_m: FiniteFloat | None = Field(
         description="kept by this link from this obstacle beyond the required "
-        "clearance in the next round; where joints moved, how far their danger region "
-        "is grown for both"
+        "clearance in the next round; null where joints moved instead"
+    )
+    region_m: FiniteFloat | None = Field(
+        default=None,
+        description="where joints moved, how far the danger region of this obstacle is "
+        "grown for this link from then on",
     )
     link_point_m: Point | None = Field(
         default=None, description=f"Coal's witness on the link; {_FRAME}"

@@ -239,6 +239,7 @@ def test_the_rounds_of_plan_json_are_what_happened(
         assert row["obstacle"] == "pillar" and row["measured_by"] == "Coal"
         assert row["distance_m"] == miss.distance
         np.testing.assert_allclose(row["normal"], miss.normal, atol=1e-12)
-        assert row["joints"] and row["moved_m"] > 0.0 and row["margin_m"] > 0.0
+        assert row["joints"] and row["moved_m"] > 0.0 and row["region_m"] > 0.0
+        assert row["margin_m"] is None
     moved: list[Adjustment] = [one for ended in found.plan.rounds for one in ended]
     assert [one.moved for one in moved] == [row["moved_m"] for row in rows]
