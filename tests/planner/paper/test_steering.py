@@ -18,7 +18,14 @@ from vdsm_pin.planner.paper.joint_paths import slide_joints
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.paper.sections import planned_gap
 from vdsm_pin.planner.paper.steps import PaperSteps
-from vdsm_pin.planner.records import UNMEASURED, Adjustment, Margin, Miss, Plan
+from vdsm_pin.planner.records import (
+    UNMEASURED,
+    Adjustment,
+    Margin,
+    Miss,
+    Plan,
+    margin_table,
+)
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
@@ -243,3 +250,13 @@ def test_the_rounds_of_plan_json_are_what_happened(
         assert row["margin_m"] is None
     moved: list[Adjustment] = [one for ended in found.plan.rounds for one in ended]
     assert [one.moved for one in moved] == [row["moved_m"] for row in rows]
+
+
+@pytest.mark.parametrize("shape", [(8,), (8, 2), (1, 8)])
+def test_margins_are_one_number_or_one_for_each_link_and_obstacle(
+    shape: tuple[int, ...],
+) -> None:
+    problem = read_problem("paper/obs1")
+    assert margin_table(problem, 0.5).tolist() == [[0.5]] * 8
+    with pytest.raises(ValueError, match=r"expected one number or \(8, 1\)"):
+        margin_table(problem, np.zeros(shape))
