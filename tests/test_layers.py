@@ -149,6 +149,26 @@ def test_planner_never_sees_what_judges_it() -> None:
         assert not any(judged), path
 
 
+@pytest.mark.parametrize(
+    ("folder", "hidden"),
+    [
+        ("", ("fewest", "impossible")),  # a plan may have steps of the paper
+        ("impossible", ("paper", "fewest")),
+        ("paper", ("fewest", "impossible")),
+        ("fewest", ("paper",)),
+    ],
+)
+def test_strategies_share_what_stands_above_them(
+    folder: str, hidden: tuple[str, ...]
+) -> None:
+    """Proofs of what is impossible stand below `fewest`, which asks for them."""
+    for path in (PACKAGE / "planner" / folder).glob("*.py"):
+        for name in imported(path):
+            assert not name.startswith(
+                tuple(f"vdsm_pin.planner.{one}" for one in hidden)
+            ), path
+
+
 def test_certificate_checker_shares_only_the_reading_of_files() -> None:
     own = {n for p in CHECKER.glob("*.py") for n in imported(p) if "vdsm_pin" in n}
     others = {n for n in own if owner(n) != "certificate_checker"}

@@ -9,8 +9,8 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Sphere
-from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.spacing import stepped
+from vdsm_pin.planner.tip_curve import led_along
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene

@@ -11,7 +11,7 @@ from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.mounted import Feed, LinkBody, Tool
 from vdsm_pin.errors import StartBlocked
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import no_way_in
 from vdsm_pin.planner.impossible.bounds import prove_tips

@@ -16,7 +16,7 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.geometry.solids import Box, Mesh, Sphere
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem

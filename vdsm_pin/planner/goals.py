@@ -16,7 +16,6 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_centres, row_centres, straight_joints
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.fewest.follow_the_leader import way_back
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.planner.records import (
     UNMEASURED,
@@ -27,6 +26,7 @@ from vdsm_pin.planner.records import (
 )
 from vdsm_pin.planner.strategies import Strategy
 from vdsm_pin.planner.time_limit import with_share
+from vdsm_pin.planner.tip_curve import way_back
 from vdsm_pin.problem.desired_path import Blocked, DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem, Posture
 from vdsm_pin.problem.trajectory import Trajectory

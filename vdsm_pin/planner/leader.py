@@ -13,8 +13,7 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_angles, link_angles
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.fewest.follow_the_leader import led_along
-from vdsm_pin.planner.fewest.route import path_rows
+from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.planner.records import (
     UNMEASURED,
     LinkClearance,
@@ -25,6 +24,7 @@ from vdsm_pin.planner.records import (
 )
 from vdsm_pin.planner.spacing import STRAYS, row_steps, stepped
 from vdsm_pin.planner.start import check_start, start_centres
+from vdsm_pin.planner.tip_curve import led_along
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES

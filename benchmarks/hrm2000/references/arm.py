@@ -12,7 +12,7 @@ import pinocchio as pin
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.fewest.route import path_rows
+from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory

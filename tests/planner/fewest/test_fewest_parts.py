@@ -8,7 +8,7 @@ from scenes_for_fewest import problem
 from vdsm_pin.arm.kinematics import joint_angles, joint_centres, link_angles
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.interval_parts import bow_bounds
@@ -17,11 +17,13 @@ from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows, stand
 from vdsm_pin.planner.fewest.offset_kernels import mutated_offsets
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
-from vdsm_pin.planner.fewest.roadmap_kernels import _drawing, _resting, pose_shapes
-from vdsm_pin.planner.fewest.route import path_rows, tip_route
+from vdsm_pin.planner.fewest.roadmap_kernels import _drawing, _resting
+from vdsm_pin.planner.fewest.route import tip_route
 from vdsm_pin.planner.fewest.sequence import WEIGHTS
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
 from vdsm_pin.planner.impossible.bounds import prove_tips
+from vdsm_pin.planner.one_knee import pose_shapes
+from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES

@@ -21,28 +21,28 @@ from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest import elastic_band, insertion, tip_routes
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.elastic_band import QUICK, THOROUGH, resampled
-from vdsm_pin.planner.fewest.follow_the_leader import (
-    followed,
-    led_along,
-    own_curve,
-    way_back,
-)
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
-from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.tip_cells import TipCells
 from vdsm_pin.planner.fewest.tip_room import TipRoom
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
+from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.tip_curve import (
+    followed,
+    led_along,
+    own_curve,
+    way_back,
+)
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene

@@ -9,7 +9,7 @@ from scenes_for_fewest import problem
 from benchmarks.hrm1000.generate import generate
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners

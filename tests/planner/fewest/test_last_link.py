@@ -12,7 +12,7 @@ from vdsm_pin.errors import HemmedIn
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.impossible.last_link import _least_along, hemmed_in
 from vdsm_pin.problem.planning_problem import PlanningProblem

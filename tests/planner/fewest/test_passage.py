@@ -17,14 +17,14 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explore import _leads_there, explore
 from vdsm_pin.planner.fewest.levels import Effort, Insert, Search
 from vdsm_pin.planner.fewest.roadmap import CostWeights
-from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.impossible.cut_off import CutOffProof, cut_off
-from vdsm_pin.planner.impossible.octree import DEPTH, Octree, adjoining, places
+from vdsm_pin.planner.octree import DEPTH, Octree, adjoining, places
+from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.planner.upper_clearance import (
     nearest_bounds,
     upper_bounds,

@@ -12,15 +12,16 @@ from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest import insertion, strategy
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import turned_towards
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Corners
-from vdsm_pin.planner.fewest.route import path_rows, tip_route
+from vdsm_pin.planner.fewest.route import tip_route
 from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
+from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.problem.desired_path import Blocked, DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem

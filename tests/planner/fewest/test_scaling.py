@@ -18,7 +18,7 @@ from vdsm_pin.geometry.solids import (
     Prism,
     Sphere,
 )
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import QUICK, THOROUGH, Effort, Insert
 from vdsm_pin.planner.fewest.motion import Corners

@@ -11,8 +11,8 @@ from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.errors import NoPlanFound, OutOfReach
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box
+from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.feasibility import rail_distance
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explain import how_far, refuse
 from vdsm_pin.planner.fewest.explore import Explored, explore
 from vdsm_pin.planner.fewest.judge import Judge
@@ -21,7 +21,7 @@ from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.narrow_passage import narrowest_passage
 from vdsm_pin.planner.fewest.notes import minimal
 from vdsm_pin.planner.fewest.roadmap import CostWeights
-from vdsm_pin.planner.fewest.route import path_rows, tip_route
+from vdsm_pin.planner.fewest.route import tip_route
 from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import (
@@ -35,6 +35,7 @@ from vdsm_pin.planner.fewest.stuck import (
     where_stuck,
 )
 from vdsm_pin.planner.impossible.bounds import prove_tips
+from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle

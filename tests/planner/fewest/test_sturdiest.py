@@ -15,13 +15,14 @@ from vdsm_pin.planner.fewest.joint_error import levers, link_by_link, link_margi
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, build_roadmap
-from vdsm_pin.planner.fewest.route import path_rows, tip_route
+from vdsm_pin.planner.fewest.route import tip_route
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.fewest.strategy import (
     plan_clearest,
     plan_fewest,
     plan_sturdiest,
 )
+from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem

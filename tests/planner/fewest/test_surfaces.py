@@ -6,8 +6,8 @@ import trimesh
 from scenes_for_fewest import problem
 
 from vdsm_pin.geometry.solids import Box, Mesh, Sphere
-from vdsm_pin.planner.fewest.broad_phase import broad_phase
-from vdsm_pin.planner.fewest.mesh_distance import STEP, surfaces_of
+from vdsm_pin.planner.broad_phase import broad_phase
+from vdsm_pin.planner.mesh_distance import STEP, surfaces_of
 from vdsm_pin.problem.held import Axes
 from vdsm_pin.verification.link_clearance import link_clearance
 

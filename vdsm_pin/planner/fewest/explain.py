@@ -20,7 +20,6 @@ from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.explore import Explored
 from vdsm_pin.planner.fewest.motion import standing
 from vdsm_pin.planner.fewest.narrow_passage import Passage, narrowest_passage
-from vdsm_pin.planner.fewest.route import PathRows
 from vdsm_pin.planner.fewest.stuck import (
     at_reach,
     following,
@@ -30,6 +29,7 @@ from vdsm_pin.planner.fewest.stuck import (
     too_narrow,
     where_stuck,
 )
+from vdsm_pin.planner.path_rows import PathRows
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import (

@@ -15,7 +15,7 @@ import numpy as np
 
 from vdsm_pin.errors import NoWayOut, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray
-from vdsm_pin.planner.fewest.broad_phase import BroadPhase
+from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.grown_nodes import fill
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.joint_error import link_margins
@@ -31,7 +31,7 @@ from vdsm_pin.planner.fewest.levels import (
     confined_first,
 )
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
-from vdsm_pin.planner.fewest.route import PathRows, path_rows, rolled, tip_route
+from vdsm_pin.planner.fewest.route import tip_route
 from vdsm_pin.planner.fewest.search import Found, Searched, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.fewest.sparsify import mean_knees, sparser
@@ -41,6 +41,7 @@ from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips
 from vdsm_pin.planner.impossible.cut_off import CutOffProof
 from vdsm_pin.planner.impossible.last_link import hemmed_in
+from vdsm_pin.planner.path_rows import PathRows, path_rows, rolled
 from vdsm_pin.planner.upper_clearance import TIP_ONLY, held_from, last_link
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem

@@ -18,9 +18,9 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.fewest.charts import coordinates, mutated, settled, turned_towards
-from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals, is_directed, standing
+from vdsm_pin.planner.tip_curve import followed, led_along
 from vdsm_pin.problem.pointing import angles_between
 
 OFFSPRING: Final = 8

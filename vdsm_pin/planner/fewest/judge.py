@@ -14,7 +14,7 @@ import numpy as np
 
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.broad_phase import BroadPhase, cuts_of
+from vdsm_pin.planner.broad_phase import BroadPhase, cuts_of
 from vdsm_pin.planner.fewest.interval_parts import LONG_TRAVEL, Parts, parts_of_pieces
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.own_clearance import OwnClearance

@@ -11,7 +11,7 @@ import numpy as np
 
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.fewest.broad_phase import BroadPhase
+from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.elastic_band import resampled
 from vdsm_pin.planner.fewest.tip_room import TipRoom
 from vdsm_pin.planner.fewest.tip_routes import TipSpace

@@ -9,9 +9,10 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.joint_error import link_by_link
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.roadmap_kernels import Graph, pose_shapes
+from vdsm_pin.planner.fewest.roadmap_kernels import Graph
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
+from vdsm_pin.planner.one_knee import pose_shapes
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 

@@ -10,7 +10,7 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.fewest.broad_phase import BroadPhase, broad_phase
+from vdsm_pin.planner.broad_phase import BroadPhase, broad_phase
 from vdsm_pin.planner.fewest.explain import (
     how_far,
     refuse,

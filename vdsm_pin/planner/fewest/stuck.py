@@ -12,11 +12,11 @@ import numpy as np
 from vdsm_pin.errors import Reached
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import rail_distance
-from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.planner.time_limit import deadline_of
+from vdsm_pin.planner.tip_curve import led_along
 from vdsm_pin.planner.upper_clearance import (
     TIP_ONLY,
     Culprit,

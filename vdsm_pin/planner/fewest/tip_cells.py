@@ -13,7 +13,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.tip_room import LEAST, NARROW, TipRoom
-from vdsm_pin.planner.impossible.octree import (
+from vdsm_pin.planner.octree import (
     DEPTH,
     Octree,
     adjoining,

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.fewest.broad_phase import BroadPhase
+from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.problem.held import TIP
 
 LEAST: Final = 0.05

@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.planner.feasibility import curled_reach
-from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.elastic_band import (
     QUICK,
     THOROUGH,
@@ -25,10 +25,10 @@ from vdsm_pin.planner.fewest.elastic_band import (
     resampled,
     shortened,
 )
-from vdsm_pin.planner.fewest.follow_the_leader import own_curve
 from vdsm_pin.planner.fewest.tip_cells import TipCells
 from vdsm_pin.planner.fewest.tip_room import TipRoom
 from vdsm_pin.planner.start import start_centres
+from vdsm_pin.planner.tip_curve import own_curve
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.tolerances import TOLERANCES

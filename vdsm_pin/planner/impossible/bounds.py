@@ -38,7 +38,7 @@ import numpy as np
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
-from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
+from vdsm_pin.planner.one_knee import pose_shapes
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.upper_clearance import upper_clearance
 from vdsm_pin.problem.held import TIP

@@ -15,7 +15,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.planner.feasibility import curled_reach
-from vdsm_pin.planner.impossible.octree import (
+from vdsm_pin.planner.octree import (
     DEPTH,
     DOUBTFUL,
     OPEN,

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound, PathBlocked
+from vdsm_pin.planner.broad_phase import keeping
 from vdsm_pin.planner.feasibility import check_feasibility
-from vdsm_pin.planner.fewest.broad_phase import keeping
 from vdsm_pin.planner.paper.avoidance import (
     Avoidance,
     Straight,

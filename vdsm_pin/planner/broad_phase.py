@@ -19,7 +19,7 @@ from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import HELD, PackedPieces, disc_extent, pack_pieces
 from vdsm_pin.geometry.solids import Mesh
-from vdsm_pin.planner.fewest.mesh_distance import Surfaces, surfaces_of
+from vdsm_pin.planner.mesh_distance import Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.problem.held import Axes, HeldApart, HeldGroup
