@@ -428,12 +428,17 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
         "built-in problems: paper/free": ["plan", "paper/obs9", "--out", out],
         "expected a file": ["plan", folder, "--out", out],
         f"try {named}": ["plan", named.parent, "--out", out],
-        "trajectory.csv: ends in none of .html": ["view", good, "--html", rows],
-        "file: ends in none of .pdf": [*verify, rows, "--pdf", file],
-        "trajectory.csv: ends in none of .certificate, .jsonl, no ending": [
+        "trajectory.csv: ends in '.csv', expected .html": [
+            "view",
+            good,
+            "--html",
+            rows,
+        ],
+        "file: has no ending, expected .pdf": [*verify, rows, "--pdf", file],
+        "trajectory.csv: ends in '.csv', expected .certificate or .jsonl or none": [
             *(*verify, rows, "--certificate", folder / "other" / "trajectory.csv")
         ],
-        "notes.md: ends in none of .urdf, .xml": [
+        "notes.md: ends in '.md', expected .urdf or .xml": [
             *("urdf", "hrm8", "--out", folder / "notes.md")
         ],
         "text.yaml": ["plan", text, "--out", out],

@@ -47,8 +47,9 @@ def check_ending(path: Path, *endings: str) -> None:
         InvalidFile: If it has none of the endings; "" stands for a name without one.
     """
     if path.suffix.lower() not in endings:
-        known = ", ".join(ending or "no ending" for ending in endings)
-        raise InvalidFile(file=path, fault=f"ends in none of {known}")
+        known = " or ".join(ending or "none" for ending in endings)
+        found = f"ends in {path.suffix!r}" if path.suffix else "has no ending"
+        raise InvalidFile(file=path, fault=f"{found}, expected {known}")
 
 
 def check_output_file(path: Path) -> None:
