@@ -217,7 +217,7 @@ def _chosen(problem: PlanningProblem, plan: Plan, deadline: Deadline) -> Plan:
     """
     if not plan.rivals:
         return replace(plan, problem=problem)
-    plans, planned, none = (*plan.rivals, plan), plan.problem, ErrorBox()
+    plans, planned, none = (plan, *plan.rivals), plan.problem, ErrorBox()
     motions = [one.trajectory for one in plans]
     best, error = sturdiest(planned, motions, deadline)
     kept = quantity(error, "rad", floor)

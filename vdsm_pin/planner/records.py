@@ -116,7 +116,7 @@ class Plan(Summarised):
             and their reasons, lower bounds proved.
         rivals: Further plans of the same, none where the strategy has decided: the
             largest joint error that is proved to be survived decides between them and
-            this one, which loses a draw.
+            this one, which wins a draw, as the first of them does.
         steps: What each of the paper's steps found, by the strategy `paper`.
         rounds: What Coal found too near after each lift of the strategy `paper`, and
             how the joints were moved on for the next one.

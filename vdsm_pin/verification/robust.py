@@ -144,7 +144,8 @@ def sturdiest(
 
     Args:
         problem: Arm, scene, required clearances.
-        motions: At least one; of equals the first is taken.
+        motions: At least one; of those equal within the width of the bisection the
+            first is taken.
         deadline: When to give up.
 
     Returns:
@@ -159,7 +160,7 @@ def sturdiest(
         # Most are told apart by the first gap in the proof of what the best survives.
         if is_certified(problem, motion, ErrorBox(joint=largest), deadline):
             error = largest_joint_error(problem, motion, none, deadline)
-            if error > largest:
+            if error > largest + TOLERANCES.joint_error:
                 best, largest = number, error
     return best, largest
 

@@ -126,7 +126,11 @@ def plan_sturdiest(
     whole = max(map(drawn_length, plans)) - TOLERANCES.joint_centre
     plans = _different([plan for plan in plans if drawn_length(plan) >= whole])
     try:
-        best = max(plans, key=lambda plan: wide.survived(plan.centres))
+        # The start often tells what all survive: then the clearest is the best.
+        plans.sort(key=lambda plan: -float(wide.kept(plan.centres).min()))
+        survived = [wide.survived(plan.centres) for plan in plans]
+        enough = max(survived) - TOLERANCES.joint_error
+        best = plans[next(k for k, error in enumerate(survived) if error >= enough)]
     except OutOfTime:
         return plans[-1]
     return replace(best, rivals=tuple(plan for plan in plans if plan is not best))
