@@ -10,6 +10,7 @@ from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -18,6 +19,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import SLICES
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification import robust
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.robust import (
     LARGEST,
@@ -172,3 +174,16 @@ def test_what_is_asked_before_makes_no_question_harder() -> None:
     nominal = slices(0.0)
     slices(LARGEST)
     assert slices(0.0) == nominal
+
+
+@pytest.mark.parametrize(("more", "best"), [(5e-6, 0), (2e-5, 1)])
+def test_the_last_digits_of_a_bisection_decide_nothing(
+    more: float, best: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What two motions survive is known to 1e-5 rad: of equals the first is taken."""
+    survived = iter((0.1, 0.1 + more))
+    monkeypatch.setattr(robust, "largest_joint_error", lambda *_: next(survived))
+    monkeypatch.setattr(robust, "is_certified", lambda *_: True)
+    motions = [Trajectory.of_joints(np.zeros((1, 17)))] * 2
+    found, _ = robust.sturdiest(read_problem("paper/obs1"), motions)
+    assert found == best
