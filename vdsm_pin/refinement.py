@@ -223,7 +223,7 @@ def _chosen(problem: PlanningProblem, plan: Plan, deadline: Deadline) -> Plan:
     kept = quantity(error, "rad", floor)
     note = (
         f"every joint may be off by ±{kept} at once (proved); of "
-        f"{len(plans)} plans that draw as much none was proved to survive more"
+        f"{len(plans)} plans that draw as much none was proved to survive 0.001° more"
     )
     start = plan.trajectory.part(0, 1)
     survived = largest_joint_error(planned, start, none, deadline)

@@ -127,13 +127,13 @@ def plan_sturdiest(
     plans = _different([plan for plan in plans if drawn_length(plan) >= whole])
     try:
         # The start often tells what all survive: then the clearest is the best.
-        plans.sort(key=lambda plan: -float(wide.kept(plan.centres).min()))
-        survived = [wide.survived(plan.centres) for plan in plans]
+        clearest = sorted(plans, key=lambda plan: -float(wide.kept(plan.centres).min()))
+        survived = [wide.survived(plan.centres) for plan in clearest]
         enough = max(survived) - TOLERANCES.joint_error
-        best = plans[next(k for k, error in enumerate(survived) if error >= enough)]
+        best = clearest[next(k for k, error in enumerate(survived) if error >= enough)]
     except OutOfTime:
         return plans[-1]
-    return replace(best, rivals=tuple(plan for plan in plans if plan is not best))
+    return replace(best, rivals=tuple(plan for plan in clearest if plan is not best))
 
 
 def _different(plans: list[Plan]) -> list[Plan]:
