@@ -47,7 +47,7 @@ report: figures
 	$(BIN)/python analysis/moving_obstacle.py --out reports/paper
 	$(BIN)/python analysis/closed_loop.py --out reports/paper
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[references]'
-	PYTHONPATH=. $(BIN)/python analysis/baselines.py --out reports/paper --sample 4
+	PYTHONPATH=. $(BIN)/python analysis/baselines.py --out reports/paper --sample 12 --slow 6
 
 claims: $(VENV)/.installed
 	PYTHONPATH=. $(BIN)/python analysis/claims.py
