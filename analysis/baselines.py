@@ -257,6 +257,14 @@ def markdown(lines: list[Line], sampled: list[Line]) -> str:
     return "\n".join([*head, *rows, *words, *table, ""])
 
 
+def shortened(one: Line) -> dict[str, object]:
+    """A line for the file, its numbers to six digits: there are 1,416 of them."""
+    return {
+        key: float(f"{value:.6g}") if isinstance(value, float) else value
+        for key, value in asdict(one).items()
+    }
+
+
 def main() -> None:
     """Run everything and write both files."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -278,7 +286,7 @@ def main() -> None:
         lines = [ask(*one) for one in product(METHODS, SCENES)]
         some = (options.sample, options.slow, options.minutes)
         sampled = list(sample(ask, *some))
-    rows = [*map(asdict, lines), *map(asdict, sampled)]
+    rows = [shortened(one) for one in (*lines, *sampled)]
     write_table(options.out, "baselines", rows, markdown(lines, sampled))
 
 

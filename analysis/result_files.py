@@ -51,7 +51,8 @@ def write_table(folder: Path, name: str, rows: Sequence[Any], text: str) -> None
         text: The same for reading.
     """
     plain = [row if isinstance(row, dict) else asdict(row) for row in rows]
-    content = "[\n" + ",\n".join(map(json.dumps, plain)) + "\n]\n"
+    lines = (json.dumps(row, separators=(",", ":")) for row in plain)
+    content = "[\n" + ",\n".join(lines) + "\n]\n"
     (folder / f"{name}.json").write_text(content, encoding="utf-8")
     (folder / f"{name}.md").write_text(text, encoding="utf-8")
     print(text)
