@@ -167,14 +167,14 @@ def test_an_unknown_obstacle_and_a_list_of_another_arm_are_named(
     _, text = run([*words, "--obstacle-error-mm", "c=1"])
     assert "'c'" in text and "a, b" in text
     _, text = run([*words, "--joint-error-deg", "1,2,3"])
-    assert "joint errors are 3 numbers, expected 1 or 2" in text
+    assert "errors of 3 joints are given one by one, expected 2" in text
 
 
 def test_a_shorter_list_is_refused_beside_a_whole_one() -> None:
     whole, short = (error_boxes.ErrorBox(joints=((0.01, 0.01),) * n) for n in (8, 3))
     asked = made_up.problem().under(whole)
     with pytest.raises(
-        InvalidInput, match="joint errors are 3 numbers, expected 1 or 8"
+        InvalidInput, match="errors of 3 joints are given one by one, expected 8"
     ):
         asked.under(short)
 

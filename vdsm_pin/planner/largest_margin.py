@@ -32,12 +32,14 @@ class Widest:
     Args:
         plans: In the order of their reserves.
         beyond: The least reserve that was tried in vain, else one that nothing has.
+        reserve: What the last plan was to keep; 0 for the first, which is given.
         tried: Whether it was tried.
         in_time: Whether the search came to its end before the time was over.
     """
 
     plans: list[Plan]
     beyond: float
+    reserve: float = 0.0
     tried: bool = False
     in_time: bool = True
 
@@ -74,7 +76,7 @@ def widest(
         The plans, the first one included.
     """
     plans, whole = [first], drawn_length(first) - TOLERANCES.joint_centre
-    tried = False
+    reserve, tried = 0.0, False
     for _ in range(rounds):
         if not until < high - low < np.inf:
             break
@@ -82,12 +84,12 @@ def widest(
         try:
             plan = plan_with(middle)
         except OutOfTime:
-            return Widest(plans, high, tried, in_time=False)
+            return Widest(plans, high, reserve, tried, in_time=False)
         except Infeasible:
             plan = None
         if plan is not None and drawn_length(plan) >= whole:
             plans.append(plan)
-            low = middle
+            low = reserve = middle
         else:
             high, tried = middle, True
-    return Widest(plans, high, tried)
+    return Widest(plans, high, reserve, tried)

@@ -4,9 +4,9 @@ import numpy as np
 
 from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.tolerances import TOLERANCES
 
-GAIN = TOLERANCES.search_gain
+COSINE_ROUNDING = 1e-12
+"""By which cosines of angles at their limit may be less; arctan decides; [-]."""
 
 
 @compiled
@@ -87,7 +87,7 @@ def _pose(
         wy, wz = vy, vz
     wx = np.sqrt(1.0 - wy * wy - wz * wz)
     # Most poses break the limit; cosines tell so without an arctan.
-    least = np.cos(limit) - GAIN
+    least = np.cos(limit) - COSINE_ROUNDING
     if wx < least or wx * vx + wy * vy + wz * vz < least:
         return False
     bends[0] = np.arctan2(np.sqrt(wy * wy + wz * wz), wx)

@@ -142,7 +142,10 @@ class PlanningProblem(AnyProblem, ByValue):
                 raise UnknownName(kind="obstacle", name=one.name, known=known)
         found, expected = len(errors.joints), self.manipulator.n_links
         if found not in (0, expected):
-            message = f"joint errors are {found} numbers, expected 1 or {expected}"
+            message = (
+                f"errors of {found} joints are given one by one, expected {expected} "
+                "(or one error for all)"
+            )
             raise InvalidInput(message)
         errors.angles(expected)
 

@@ -30,6 +30,7 @@ from vdsm_pin.planner.fewest.strategy import (
 )
 from vdsm_pin.planner.largest_margin import drawn_length, widest
 from vdsm_pin.planner.paper.clearest import plan_paper_clearest
+from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -93,6 +94,14 @@ def test_more_time_never_loses_a_plan(planner: Planner) -> None:
     for plan in filter(None, plans):
         assert drawn_length(plan) == pytest.approx(drawn_length(whole), abs=1e-9)
         assert verify(task, plan.trajectory).verdict is Verdict.CERTIFIED
+
+
+def test_a_first_plan_of_the_papers_rule_stays_at_every_question_after_it() -> None:
+    task = corner("obs1")
+    counted = Counted(link_clearance(task))
+    plan_paper(task, counted, NO_MARGIN)
+    for last in range(counted.asked + 1, counted.asked + 5):
+        assert planned(plan_paper_clearest, task, float(last)) is not None, last
 
 
 def test_an_improvement_that_takes_too_long_leaves_what_there_was() -> None:

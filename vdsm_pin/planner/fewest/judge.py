@@ -412,7 +412,8 @@ class Judge:
     def _on_rail(self, intervals: Intervals, number: IntArray) -> BoolArray:
         """Whether there is an arm at some places of intervals of directions, (r,).
 
-        Where there is none whose base is on its rail, joint centres are NaN.
+        Where there is none whose base is on its rail, joint centres are NaN. Between
+        these places nobody looks: the verification judges the whole motion.
         """
         arm, kept = self.problem.manipulator, np.ones(len(number), dtype=np.bool_)
         for share in SHARES:

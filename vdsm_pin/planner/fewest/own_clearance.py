@@ -22,7 +22,12 @@ FINE: Final = 0.1
 """Part of the way of the body below which they count as apart between two places where
 they are; [-]."""
 SWELL: Final = 1.1
-"""An arm may turn farther within an interval than at its ends, over these; [-]."""
+"""An arm may turn farther within an interval than at its ends, over these; [-].
+
+Random pairs of hrm8 turn 1.05 times as far between directions that are 0.2 apart, and
+no farther between projections; directions that are 0.5 to 1 apart turn up to 2.3 times
+as far, and intervals are cut shorter than that.
+"""
 
 
 class _Place(NamedTuple):

@@ -37,24 +37,20 @@ def plan_paper_clearest(
 
     Arguments and errors are those of `plan_paper`.
     """
-    name = "paper-clearest"
-    first = plan_paper(problem, clearance, margin)
+    first = replace(plan_paper(problem, clearance, margin), strategy="paper-clearest")
     if not problem.scene.obstacles:
-        return replace(first, strategy=name)
+        return first
     kept = problem.required_clearance + np.max(margin)
-    low, high = (
-        float(clearance(centres).min()) - kept
-        for centres in (first.centres, first.centres[:1])
-    )
+    try:
+        low, high = (
+            float(clearance(centres).min()) - kept
+            for centres in (first.centres, first.centres[:1])
+        )
+    except OutOfTime:
+        return first
     hurried = with_share(clearance, IMPROVE_SHARE)
-    made = [(0.0, first)]
-
-    def wider(more: float) -> Plan:
-        made.append((more, plan_paper(problem, hurried, margin + more)))
-        return made[-1][1]
-
     found = widest(
-        wider,
+        lambda more: plan_paper(problem, hurried, margin + more),
         first,
         max(low, 0.0),
         high,
@@ -64,9 +60,9 @@ def plan_paper_clearest(
     plan = found.plans[-1]
     if measure is not UNMEASURED:
         # The widest of them once more, Coal measuring; else it stays as it is.
-        more = next(reserve for reserve, one in made if one is plan)
         with suppress(Infeasible, OutOfTime):
-            steered = plan_paper(problem, clearance, margin + more, measure)
+            steered = plan_paper(problem, clearance, margin + found.reserve, measure)
             if drawn_length(steered) >= drawn_length(plan) - TOLERANCES.joint_centre:
                 plan = steered
-    return replace(plan, strategy=name, notes=(*plan.notes, found.told(kept)))
+    notes = (*plan.notes, found.told(kept))
+    return replace(plan, strategy=first.strategy, notes=notes)
