@@ -8,13 +8,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.app.subjects import ProblemOrCell
+from vdsm_pin.io.atomic import write_text
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.report.folder import (
-    CERTIFICATES,
-    check_outputs,
-    problem_beside,
-)
+from vdsm_pin.report.folder import CERTIFICATES, check_outputs, problem_beside
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.units import MM_PER_M
@@ -88,7 +85,11 @@ def _deg(angle: float) -> float:
 
 
 def stated_cell(
-    cell: Cell, files: RobotFiles, scene: Path | None, certificate: Path, motion: Path
+    cell: ProblemOrCell,
+    files: RobotFiles,
+    scene: Path | None,
+    certificate: Path,
+    motion: Path,
 ) -> Cell:
     """The same cell, read from a problem file that is written for it.
 
@@ -102,10 +103,9 @@ def stated_cell(
     Raises:
         InvalidInput: If the file cannot be written, or is one that is read.
     """
+    assert isinstance(cell, Cell)  # what has a URDF
     path = problem_beside(certificate)
     outputs = (certificate, CERTIFICATES), (path, (".yaml",))
     check_outputs((*cell.files, motion), files=outputs)
-    text = problem_text(cell, files, scene, path.parent)
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, problem_text(cell, files, scene, path.parent))
     return read_cell(path).under(cell.errors)

@@ -17,6 +17,7 @@ from vdsm_pin.cli.options import (
     examples,
     family,
     grouped,
+    option,
 )
 from vdsm_pin.cli.robot import Topic, refuse_beside
 from vdsm_pin.text import printable
@@ -71,10 +72,7 @@ def simulate(
     trajectory: Trajectory,
     out: OutFolder,
     settings: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Masses, cables, motors, gains and kicks (YAML)."
-        ),
+        Path | None, option("FILE", "Masses, cables, motors, gains and kicks (YAML).")
     ] = None,
     *,
     answer: Answer,
@@ -116,11 +114,7 @@ def explain(
     out: OutFolder,
     waypoint: Annotated[
         int | None,
-        typer.Option(
-            min=0,
-            metavar="NUMBER",
-            help="From 0; the one with the largest link angle if none.",
-        ),
+        option("NUMBER", "From 0; the one with the largest link angle if none.", min=0),
     ] = None,
     *,
     answer: Answer,
@@ -159,18 +153,17 @@ def convert(
     problem: ProblemArgument,
     out: OutFolder,
     trajectory: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Joint angles, CSV, YAML, JSON or bag."),
+        Path | None, option("FILE", "Joint angles, CSV, YAML, JSON or bag.")
     ] = None,
     centres: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Joint centres, as centres.csv.")
+        Path | None, option("FILE", "Joint centres, as centres.csv.")
     ] = None,
     cables: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Cable lengths, as cables.csv.")
+        Path | None, option("FILE", "Cable lengths, as cables.csv.")
     ] = None,
     also: Annotated[
         list[Format] | None,
-        typer.Option(help="Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
+        option(None, "Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
     ] = None,
     topic: Topic = None,
     *,

@@ -18,7 +18,8 @@ from vdsm_pin.cli.options import (
     examples,
     family,
     grouped,
-    problems_from,
+    option,
+    problem_argument,
 )
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import COLD_PLAN_LIMIT
@@ -39,23 +40,21 @@ def batch(
     *,
     problems: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="PROBLEM",
-            help="Built-in names, problem files or folders of them; the built-in "
-            "problems if there is none.",
-            autocompletion=problems_from,
+        problem_argument(
+            "Built-in names, problem files or folders of them; the built-in problems "
+            "if there is none."
         ),
     ] = None,
     strategy: Strategy = DEFAULT_STRATEGY,
     trajectories: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="FILE",
-            help="Given motions, or folders of them: each is verified for each "
+        option(
+            "FILE",
+            "Given motions, or folders of them: each is verified for each "
             "problem, nothing is planned; robots of a URDF need it.",
         ),
     ] = None,
-    jobs: Annotated[int, typer.Option(min=1, metavar="NUMBER", help="Processes.")] = 1,
+    jobs: Annotated[int, option("NUMBER", "Processes.", min=1)] = 1,
     resume: Annotated[
         bool,
         typer.Option("--resume", help="Skip problems that are finished and intact."),
@@ -63,13 +62,11 @@ def batch(
     time_limit: PlanningTime = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(
-            metavar="ADDRESS", help="A Dask scheduler, as tcp://host:8786; no --jobs."
-        ),
+        option("ADDRESS", "A Dask scheduler, as tcp://host:8786; no --jobs."),
     ] = None,
     keep: Annotated[
         Literal["all", "failed", "none"],
-        typer.Option(help="Whose files stay; every problem keeps its row."),
+        option(None, "Whose files stay; every problem keeps its row."),
     ] = "all",
     errors: ErrorOptions,
     slide_error_mm: SlideErrors = "0",

@@ -40,110 +40,68 @@ def problems_from(incomplete: str) -> list[str]:
     return from_words(built_in_names())(incomplete)
 
 
-ProblemArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="PROBLEM",
-        help="A built-in name or a problem file.",
-        autocompletion=problems_from,
-    ),
-]
+def problem_argument(help: str) -> Any:
+    """An argument that is a problem, or several."""
+    return typer.Argument(metavar="PROBLEM", help=help, autocompletion=problems_from)
+
+
+def option(metavar: str | None, help: str, **how: Any) -> Any:
+    """An option that is called as its parameter, and what its value is called."""
+    return typer.Option(metavar=metavar, help=help, **how)
+
+
+ProblemArgument = Annotated[str, problem_argument("A built-in name or a problem file.")]
 OutFolder = Annotated[
     Path, typer.Option("--out", metavar="FOLDER", help="Where the results go.")
 ]
 Trajectory = Annotated[
     Path,
-    typer.Option(
-        metavar="FILE",
-        help="The motion: rows of joint values (CSV); of a robot YAML, JSON, bags too.",
+    option(
+        "FILE",
+        "The motion: rows of joint values (CSV); of a robot YAML, JSON, bags too.",
     ),
 ]
 ShownMotion = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE", help="The motion (CSV); the arm at its start if none."
-    ),
+    Path | None, option("FILE", "The motion (CSV); the arm at its start if none.")
 ]
 Strategy = Annotated[
     str,
-    typer.Option(
-        metavar="NAME",
-        help=f"One of {', '.join(STRATEGIES)}.",
+    option(
+        "NAME",
+        f"One of {', '.join(STRATEGIES)}.",
         autocompletion=from_words(STRATEGIES),
-    ),
-]
-
-BaseError = Annotated[
-    float,
-    typer.Option(
-        min=0.0, metavar="MM", help="Largest shift of the base, any direction [mm]."
-    ),
-]
-BaseTurn = Annotated[
-    float,
-    typer.Option(
-        min=0.0, metavar="DEG", help="Largest turn of the base about its origin [deg]."
-    ),
-]
-JointErrors = Annotated[
-    str,
-    typer.Option(
-        metavar="DEG[,DEG..]",
-        help="Largest error of every joint angle, or one for each joint from the base "
-        "[deg]; of some joints of a robot: JOINT=DEG[,JOINT=DEG..].",
     ),
 ]
 SlideErrors = Annotated[
     str,
-    typer.Option(
-        metavar="MM",
-        help="Largest error of a robot's joints that slide, or JOINT=MM[,JOINT=MM..] "
-        "[mm].",
+    option(
+        "MM",
+        "Largest error of a robot's joints that slide, or JOINT=MM[,JOINT=MM..] [mm].",
     ),
 ]
-ObstacleErrors = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="[NAME=]MM",
-        help="Largest error of the obstacles, or of one; again for another [mm].",
-    ),
-]
-ObstacleTurns = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="NAME=DEG",
-        help="Largest turn of an obstacle about its middle; again for another [deg].",
-    ),
-]
-
 PlanningTime = Annotated[
     float | None,
-    typer.Option(
-        min=0.001,
-        metavar="SECONDS",
-        help="When to give up, in a batch on each problem; inf for never. By default "
+    option(
+        "SECONDS",
+        "When to give up, in a batch on each problem; inf for never. By default "
         f"{PLAN_LIMIT:g}, and {COLD_PLAN_LIMIT:g} for the first plan here (it "
         "compiles) and on a cluster.",
+        min=0.001,
     ),
 ]
 TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        min=0.001, metavar="SECONDS", help="When to give up; never by default."
-    ),
-]
-
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]
-AsJson = Annotated[
-    bool, typer.Option("--json", help="Print the result as JSON, for other programs.")
+    float | None, option("SECONDS", "When to give up; never by default.", min=0.001)
 ]
 
 
 class Answer(NamedTuple):
     """How a command says what it did."""
 
-    quiet: Quiet = False
-    as_json: AsJson = False
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False
+    as_json: Annotated[
+        bool,
+        typer.Option("--json", help="Print the result as JSON, for other programs."),
+    ] = False
 
     @property
     def wordless(self) -> bool:
@@ -195,11 +153,35 @@ def examples(*lines: str) -> str:
 class ErrorOptions(NamedTuple):
     """Errors as they were given, see `grouped`."""
 
-    joint_error_deg: JointErrors = "0"
-    base_error_mm: BaseError = 0.0
-    base_error_deg: BaseTurn = 0.0
-    obstacle_error_mm: ObstacleErrors = None
-    obstacle_error_deg: ObstacleTurns = None
+    joint_error_deg: Annotated[
+        str,
+        option(
+            "DEG[,DEG..]",
+            "Largest error of every joint angle, or one for each joint from the base "
+            "[deg]; of some joints of a robot: JOINT=DEG[,JOINT=DEG..].",
+        ),
+    ] = "0"
+    base_error_mm: Annotated[
+        float, option("MM", "Largest shift of the base, any direction [mm].", min=0.0)
+    ] = 0.0
+    base_error_deg: Annotated[
+        float,
+        option("DEG", "Largest turn of the base about its origin [deg].", min=0.0),
+    ] = 0.0
+    obstacle_error_mm: Annotated[
+        list[str] | None,
+        option(
+            "[NAME=]MM",
+            "Largest error of the obstacles, or of one; again for another [mm].",
+        ),
+    ] = None
+    obstacle_error_deg: Annotated[
+        list[str] | None,
+        option(
+            "NAME=DEG",
+            "Largest turn of an obstacle about its middle; again for another [deg].",
+        ),
+    ] = None
 
     def box(self, slide_mm: str = "0") -> "ErrorBox":
         """The error box that they say, with what joints that slide are off by.

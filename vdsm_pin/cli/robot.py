@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
-import typer
-
-from vdsm_pin.cli.options import problems_from
+from vdsm_pin.cli.options import option, problem_argument
 from vdsm_pin.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -15,94 +13,56 @@ if TYPE_CHECKING:
 
 
 ProblemOrNone = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="PROBLEM",
-        help="A built-in name or a problem file; none with --urdf.",
-        autocompletion=problems_from,
-    ),
-]
-Urdf = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="A robot of any kind, in place of a problem."),
-]
-Srdf = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE", help="Pairs of its links that need not be held apart."
-    ),
-]
-SceneFile = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="Its obstacles; YAML or a PlanningScene."),
-]
-PackageDirs = Annotated[
-    list[Path] | None,
-    typer.Option(
-        metavar="FOLDER",
-        exists=True,
-        file_okay=False,
-        help="Where package:// is looked for.",
-    ),
-]
-Locks = Annotated[
-    list[str] | None,
-    typer.Option(metavar="JOINT=VALUE", help="A joint that stands still [rad, m]."),
-]
-Group = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME", help="Group of the SRDF whose joints move; others stand still."
-    ),
-]
-Bodies = Annotated[
-    Literal["hull", "parts", "primitives"] | None,
-    typer.Option(help="What stands for the mesh of a link; its hull by default."),
-]
-Parts = Annotated[
-    int | None,
-    typer.Option(min=1, max=256, metavar="NUMBER", help="Hulls of one mesh [8]."),
-]
-JointLimits = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE", help="A joint_limits.yaml; the stricter limit counts."
-    ),
+    str | None, problem_argument("A built-in name or a problem file; none with --urdf.")
 ]
 Topic = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME[#K]", help="Of a trajectory in a bag, and its message from 0."
-    ),
-]
-RequiredClearance = Annotated[
-    float | None,
-    typer.Option(
-        min=0.0, metavar="MM", help="With --urdf: from obstacles [mm]; 0 by default."
-    ),
-]
-RequiredSelfClearance = Annotated[
-    float | None,
-    typer.Option(
-        min=0.0, metavar="MM", help="With --urdf: between links [mm]; 0 by default."
-    ),
+    str | None, option("NAME[#K]", "Of a trajectory in a bag, and its message from 0.")
 ]
 
 
 class RobotOptions(NamedTuple):
     """Options as they were given, see `grouped`; None where they were not."""
 
-    urdf: Urdf = None
-    srdf: Srdf = None
-    scene: SceneFile = None
-    package_dir: PackageDirs = None
-    lock: Locks = None
-    required_clearance_mm: RequiredClearance = None
-    required_self_clearance_mm: RequiredSelfClearance = None
-    group: Group = None
-    bodies: Bodies = None
-    parts: Parts = None
-    joint_limits: JointLimits = None
+    urdf: Annotated[
+        Path | None, option("FILE", "A robot of any kind, in place of a problem.")
+    ] = None
+    srdf: Annotated[
+        Path | None, option("FILE", "Pairs of its links that need not be held apart.")
+    ] = None
+    scene: Annotated[
+        Path | None, option("FILE", "Its obstacles; YAML or a PlanningScene.")
+    ] = None
+    package_dir: Annotated[
+        list[Path] | None,
+        option(
+            "FOLDER", "Where package:// is looked for.", exists=True, file_okay=False
+        ),
+    ] = None
+    lock: Annotated[
+        list[str] | None, option("JOINT=VALUE", "A joint that stands still [rad, m].")
+    ] = None
+    required_clearance_mm: Annotated[
+        float | None,
+        option("MM", "With --urdf: from obstacles [mm]; 0 by default.", min=0.0),
+    ] = None
+    required_self_clearance_mm: Annotated[
+        float | None,
+        option("MM", "With --urdf: between links [mm]; 0 by default.", min=0.0),
+    ] = None
+    group: Annotated[
+        str | None,
+        option("NAME", "Group of the SRDF whose joints move; others stand still."),
+    ] = None
+    bodies: Annotated[
+        Literal["hull", "parts", "primitives"] | None,
+        option(None, "What stands for the mesh of a link; its hull by default."),
+    ] = None
+    parts: Annotated[
+        int | None, option("NUMBER", "Hulls of one mesh [8].", min=1, max=256)
+    ] = None
+    joint_limits: Annotated[
+        Path | None, option("FILE", "A joint_limits.yaml; the stricter limit counts.")
+    ] = None
 
     def cell(self) -> "Cell":
         """The robot and what it is held to.

@@ -15,6 +15,7 @@ from vdsm_pin.cli.options import (
     family,
     from_words,
     grouped,
+    option,
     problems_from,
 )
 from vdsm_pin.text import printable
@@ -40,11 +41,7 @@ def _schemas_from(incomplete: str) -> list[str]:
 def problems(
     show: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Print this problem's file.",
-            autocompletion=problems_from,
-        ),
+        option("NAME", "Print this problem's file.", autocompletion=problems_from),
     ] = None,
 ) -> None:
     """List the built-in problems, or print one."""

@@ -18,6 +18,7 @@ from vdsm_pin.cli.options import (
     examples,
     family,
     grouped,
+    option,
 )
 from vdsm_pin.cli.robot import ProblemOrNone, RobotOptions, Topic, refuse_beside
 from vdsm_pin.errors import InvalidInput
@@ -53,14 +54,11 @@ def verify(
     errors: ErrorOptions,
     slide_error_mm: SlideErrors = "0",
     certificate: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the proof to this file.")
+        Path | None, option("FILE", "Write the proof to this file.")
     ] = None,
     pdf: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Print the report to this file; needs Chromium or Chrome.",
-        ),
+        option("FILE", "Print the report to this file; needs Chromium or Chrome."),
     ] = None,
     time_limit: TimeLimit = None,
     all_pairs: Annotated[
@@ -71,9 +69,10 @@ def verify(
     ] = False,
     interpolation: Annotated[
         Interpolation,
-        typer.Option(
-            help="What joins waypoints: straight lines, or smooth pieces by the "
-            "velocities (cubic) and accelerations (quintic) of the trajectory."
+        option(
+            None,
+            "What joins waypoints: straight lines, or smooth pieces by the "
+            "velocities (cubic) and accelerations (quintic) of the trajectory.",
         ),
     ] = "auto",
     answer: Answer,
@@ -100,7 +99,10 @@ def verify(
     with enforced(deadline, grace=0.0):
         asked = asked_problem(problem, box, robot, of_arm, topic)
         if certificate is not None and robot.urdf is not None:
-            asked = _write_problem(asked, robot, certificate, trajectory)
+            from vdsm_pin.app.stated_problem import stated_cell
+
+            files = robot.files(), robot.scene, certificate, trajectory
+            asked = stated_cell(asked, *files)
         order = VerifyOrder(
             problem=asked,
             trajectory=trajectory,
@@ -143,20 +145,6 @@ def asked_problem(
     else:
         refuse_beside("a robot", of_arm)
     return asked.under(errors)
-
-
-def _write_problem(
-    asked: "PlanningProblem | Cell",
-    robot: RobotOptions,
-    certificate: Path,
-    motion: Path,
-) -> "Cell":
-    """Write what options ask to a problem file beside the certificate, and read it."""
-    from vdsm_pin.app.stated_problem import stated_cell
-    from vdsm_pin.robots.cell import Cell
-
-    assert isinstance(asked, Cell)  # of a URDF
-    return stated_cell(asked, robot.files(), robot.scene, certificate, motion)
 
 
 def _verify_and_tell(order: "VerifyOrder", answer: Answer) -> bool:
@@ -208,8 +196,7 @@ def repair(
     robot: RobotOptions,
     topic: Topic = None,
     pin: Annotated[
-        list[int] | None,
-        typer.Option(metavar="ROW", help="A waypoint, from 0, that stays."),
+        list[int] | None, option("ROW", "A waypoint, from 0, that stays.")
     ] = None,
     time_limit: TimeLimit = None,
     answer: Answer,

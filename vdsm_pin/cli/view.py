@@ -12,6 +12,7 @@ from vdsm_pin.cli.options import (
     examples,
     family,
     grouped,
+    option,
 )
 from vdsm_pin.cli.robot import refuse_beside
 
@@ -34,16 +35,10 @@ def view(
     problem: ProblemArgument,
     trajectory: ShownMotion = None,
     html: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Write the page to this file; serve nothing."
-        ),
+        Path | None, option("FILE", "Write the page to this file; serve nothing.")
     ] = None,
     port: Annotated[
-        int,
-        typer.Option(
-            min=0, max=65535, metavar="NUMBER", help="Port to serve on; 0 for any."
-        ),
+        int, option("NUMBER", "Port to serve on; 0 for any.", min=0, max=65535)
     ] = PORT,
     watch: Annotated[
         bool, typer.Option("--watch", help="Reload the page when a file changes.")
@@ -75,38 +70,31 @@ def export(
     problem: ProblemArgument,
     out: Annotated[
         Path,
-        typer.Option(metavar="FILE", help=".glb (glTF), .png or .mp4 (needs ffmpeg)."),
+        option("FILE", ".glb (glTF), .png or .mp4 (needs ffmpeg)."),
     ],
     trajectory: ShownMotion = None,
     moment: Annotated[
         float | None,
-        typer.Option(
-            min=0.0,
-            metavar="WAYPOINT",
-            help="Of a .png; 12.5 is between two; 0 by default.",
-        ),
+        option("WAYPOINT", "Of a .png; 12.5 is between two; 0 by default.", min=0.0),
     ] = None,
     seconds: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "SECONDS",
+            "How long it plays; as the trajectory's times say, or 10.",
             min=0.1,
             max=86400.0,
-            metavar="SECONDS",
-            help="How long it plays; as the trajectory's times say, or 10.",
         ),
     ] = None,
     look: Annotated[
         str,
-        typer.Option(
-            metavar="VIEW",
-            help="overview, side, top, front, tip, or a direction: 1,-1,0.5.",
-        ),
+        option("VIEW", "overview, side, top, front, tip, or a direction: 1,-1,0.5."),
     ] = OVERVIEW,
     width: Annotated[
-        int, typer.Option(min=64, max=4096, metavar="PIXELS", help="Of the picture.")
+        int, option("PIXELS", "Of the picture.", min=64, max=4096)
     ] = WIDTH,
     height: Annotated[
-        int, typer.Option(min=64, max=4096, metavar="PIXELS", help="Of the picture.")
+        int, option("PIXELS", "Of the picture.", min=64, max=4096)
     ] = HEIGHT,
     numbers: Annotated[
         bool, typer.Option("--numbers", help="Number the links.")
