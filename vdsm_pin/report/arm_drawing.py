@@ -1,6 +1,5 @@
 """What a page shows of a snake arm: its links, the desired path, its joints' plots."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -14,7 +13,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.charts import limit, packed, series
+from vdsm_pin.report.charts import chart, packed, series
 from vdsm_pin.report.drawing import (
     DrawnPart,
     Silhouette,
@@ -103,15 +102,34 @@ class ArmDrawing:
         """Every plot in order; angles in degrees, lengths in mm."""
         arm, rows = self.problem.manipulator, self.trajectory
         alpha, theta = rows.alpha[shown.rows], rows.theta[shown.rows]
-        psi = link_angles(alpha, theta)
+        psi, x0 = link_angles(alpha, theta), rows.x0[shown.rows] * MM_PER_M
+        cone, box = (np.degrees(a) for a in (arm.max_link_angle, arm.max_joint_angle))
+        low, high = (v * MM_PER_M for v in arm.base_range)
+        ends = " to ".join(signed(f"{value:g}") for value in (low, high))
+        changed = changed_angles(psi).astype(np.float64)
+        either = (f"+{box:g}°", box), (f"−{box:g}°", -box)
         return [
-            _link_angle_chart(arm, psi),
-            _base_chart(arm, rows.x0[shown.rows]),
+            chart("Link angles ψ", "ψ [°]", _per_joint("ψ", psi),
+                  "Angle between neighbouring links at each joint.",
+                  [(f"cone {cone:g}°", cone)], id="psi", floor=0.0),
+            chart("Base position x₀", "x₀ [mm]", [series("x₀", _INK, x0)],
+                  f"Along the rail, from {ends} mm.",
+                  [("rail end", low), ("rail end", high)], id="x0", far_limits=True),
             *clearances,
-            _changed_chart(psi),
-            *_joint_charts(arm, alpha, theta),
-            _cable_chart(arm, alpha, theta),
-        ]
+            chart("Changed link angles", "count",
+                  [series("changed", _INK, changed, step=True)],
+                  "Number of link angles above 0.05°; fewer are easier to drive.",
+                  id="changed", floor=0.0, whole=True),
+            chart("Pitch angles θ", "θ [°]", _per_joint("θ", theta),
+                  "The pitch of each universal joint.", either,
+                  id="theta", far_limits=True),
+            chart("Yaw angles α", "α [°]", _per_joint("α", alpha),
+                  "The yaw of each universal joint.", either,
+                  id="alpha", far_limits=True),
+            chart("Cable lengths", "change [mm]", _changes(arm, alpha, theta),
+                  "Change against the straight arm; cables a, b, c of each link.",
+                  id="cables"),
+        ]  # fmt: skip
 
     def stance(self, q: FloatArray) -> dict[str, Any]:
         """The joints' centres at x0, alpha1, theta1, .., shape (1 + 2N,)."""
@@ -179,89 +197,15 @@ def _per_joint(symbol: str, values: FloatArray) -> list[dict[str, Any]]:
     ]
 
 
-def _link_angle_chart(arm: Manipulator, psi: FloatArray) -> dict[str, Any]:
-    cone = math.degrees(arm.max_link_angle)
-    return {
-        "id": "psi",
-        "title": "Link angles ψ",
-        "note": "Angle between neighbouring links at each joint.",
-        "unit": "°",
-        "axis": "ψ [°]",
-        "floor": 0.0,
-        "limits": [limit(f"cone {cone:g}°", cone)],
-        "series": _per_joint("ψ", psi),
-    }
-
-
-def _base_chart(arm: Manipulator, x0: FloatArray) -> dict[str, Any]:
-    low, high = (v * MM_PER_M for v in arm.base_range)
-    ends = " to ".join(signed(f"{value:g}") for value in (low, high))
-    return {
-        "id": "x0",
-        "title": "Base position x₀",
-        "note": f"Along the rail, from {ends} mm.",
-        "unit": " mm",
-        "axis": "x₀ [mm]",
-        "limits": [limit("rail end", low), limit("rail end", high)],
-        "far_limits": True,
-        "series": [series("x₀", _INK, x0 * MM_PER_M)],
-    }
-
-
-def _changed_chart(psi: FloatArray) -> dict[str, Any]:
-    return {
-        "id": "changed",
-        "title": "Changed link angles",
-        "note": "Number of link angles above 0.05°; fewer are easier to drive.",
-        "unit": "",
-        "axis": "count",
-        "floor": 0.0,
-        "whole": True,
-        "limits": [],
-        "series": [
-            series("changed", _INK, changed_angles(psi).astype(np.float64), step=True)
-        ],
-    }
-
-
-def _joint_charts(
+def _changes(
     arm: Manipulator, alpha: FloatArray, theta: FloatArray
 ) -> list[dict[str, Any]]:
-    box = math.degrees(arm.max_joint_angle)
-    limits = [limit(f"+{box:g}°", box), limit(f"−{box:g}°", -box)]
-    pairs = (("theta", "θ", "pitch", theta), ("alpha", "α", "yaw", alpha))
-    return [
-        {
-            "id": name,
-            "title": f"{kind.capitalize()} angles {symbol}",
-            "note": f"The {kind} of each universal joint.",
-            "unit": "°",
-            "axis": f"{symbol} [°]",
-            "limits": limits,
-            "far_limits": True,
-            "series": _per_joint(symbol, values),
-        }
-        for name, symbol, kind, values in pairs
-    ]
-
-
-def _cable_chart(
-    arm: Manipulator, alpha: FloatArray, theta: FloatArray
-) -> dict[str, Any]:
+    """Lengths of all cables less those of the straight arm."""
     zero = np.zeros((1, arm.n_links))
     lengths = cable_lengths(arm, alpha, theta)
     change = (lengths - cable_lengths(arm, zero, zero)) * MM_PER_M
-    colours = link_colours(change.shape[1])
-    return {
-        "id": "cables",
-        "title": "Cable lengths",
-        "note": "Change against the straight arm; cables a, b, c of each link.",
-        "unit": " mm",
-        "axis": "change [mm]",
-        "limits": [],
-        "series": [
-            series(f"l{i + 1}{hole}", colours[i], change[:, i, j], dash=_DASHES[j])
-            for i in range(change.shape[1])
-            for j, hole in enumerate("abc")
-        ],
-    }
+    return [
+        series(f"l{i + 1}{hole}", colour, change[:, i, j], dash=_DASHES[j])
+        for i, colour in enumerate(link_colours(arm.n_links))
+        for j, hole in enumerate("abc")
+    ]

@@ -1,6 +1,7 @@
 """What the plots of a report show: series against the row number, with their limits."""
 
 import base64
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,35 @@ def series(name: str, colour: str, values: FloatArray, **more: Any) -> dict[str,
     return {"name": name, "colour": colour, "values": packed(values), **more}
 
 
-def limit(label: str, value: float) -> dict[str, Any]:
-    """A line across a plot."""
-    return {"label": label, "value": value}
+def chart(
+    title: str,
+    axis: str,
+    lines: list[dict[str, Any]],
+    note: str,
+    limits: Sequence[tuple[str, float]] = (),
+    **more: Any,
+) -> dict[str, Any]:
+    """One plot, as `plots.js` draws it.
+
+    Args:
+        title: What stands above it, and names it where `more` has no `id`.
+        axis: What its values are, with their unit in brackets.
+        lines: See `series`.
+        note: What is to be said of it, a sentence.
+        limits: Labels and values of lines across it.
+        more: `id`, `floor`, `whole`, `scale` and `far_limits`.
+    """
+    unit = axis.partition("[")[2].rstrip("]")
+    return {
+        "id": title,
+        "title": title,
+        "note": note,
+        "unit": unit if unit in ("", "°") else f" {unit}",
+        "axis": axis,
+        "limits": [{"label": label, "value": value} for label, value in limits],
+        "series": lines,
+        **more,
+    }
 
 
 def clearance_charts(
@@ -40,12 +67,6 @@ def clearance_charts(
     required = verification.problem.required_clearance * MM_PER_M
     if not scene.names:
         return []
-    common = {
-        "unit": " mm",
-        "axis": "clearance [mm]",
-        "scale": "asinh",
-        "limits": [limit(f"required {required:g} mm", required)],
-    }
     note = "Solid: proved lower bound, rough below 0. Dashed: proved upper bound."
     # What is proved for the whole motion holds in every interval of it.
     least = min_clearance(verification)
@@ -55,32 +76,27 @@ def clearance_charts(
     obstacle_lower = np.maximum(profile.obstacle_lower[:, near], proved)
     whole = near.size == len(scene.names)
     which = "Of" if whole else f"Of the {near.size} nearest obstacles,"
+    of_links = _brackets(
+        links,
+        link_colours(len(links)),
+        shown.least(link_lower, profile.first_interval),
+        shown.least(profile.link_upper, profile.first_interval),
+    )
+    of_obstacles = _brackets(
+        [scene.names[k] for k in near],
+        obstacle_colours(near.size),
+        shown.least(obstacle_lower, profile.first_interval),
+        shown.least(profile.obstacle_upper[:, near], profile.first_interval),
+    )
+    axis, asked = "clearance [mm]", [(f"required {required:g} mm", required)]
     return [
-        common
-        | {
-            "id": "clearance-link",
-            "title": "Clearance of each link",
-            "note": f"To the nearest obstacle. {note}",
-            "series": _brackets(
-                links,
-                link_colours(len(links)),
-                shown.least(link_lower, profile.first_interval),
-                shown.least(profile.link_upper, profile.first_interval),
-            ),
-        },
-        common
-        | {
-            "id": "clearance-obstacle",
-            "title": "Clearance from each obstacle",
-            "note": f"{which} the nearest link. {note}",
-            "series": _brackets(
-                [scene.names[k] for k in near],
-                obstacle_colours(near.size),
-                shown.least(obstacle_lower, profile.first_interval),
-                shown.least(profile.obstacle_upper[:, near], profile.first_interval),
-            ),
-        },
-    ]
+        chart("Clearance of each link", axis, of_links,
+              f"To the nearest obstacle. {note}", asked,
+              id="clearance-link", scale="asinh"),
+        chart("Clearance from each obstacle", axis, of_obstacles,
+              f"{which} the nearest link. {note}", asked,
+              id="clearance-obstacle", scale="asinh"),
+    ]  # fmt: skip
 
 
 def _brackets(

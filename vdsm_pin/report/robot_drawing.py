@@ -15,7 +15,7 @@ from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.proof.bodies import Body
-from vdsm_pin.report.charts import packed, series
+from vdsm_pin.report.charts import chart, packed, series
 from vdsm_pin.report.drawing import (
     DrawnPart,
     Silhouette,
@@ -156,27 +156,18 @@ class RobotDrawing:
         """The clearances, the joints that turn, and those that slide."""
         joints, q = self.problem.robot.joints, self.trajectory.q[shown.rows]
         colours, charts = link_colours(len(joints)), list(clearances)
-        for turns, name, unit, factor in (
-            (True, "Joint angles", "°", np.degrees(1.0)),
-            (False, "Joint positions", " mm", MM_PER_M),
+        note = "By the names of the URDF, at the waypoints."
+        for turns, kind, title, unit, factor in (
+            (True, "turning", "Joint angles", "°", np.degrees(1.0)),
+            (False, "sliding", "Joint positions", "mm", MM_PER_M),
         ):
-            mine = [k for k, joint in enumerate(joints) if joint.turns is turns]
-            if not mine:
-                continue
-            charts.append(
-                {
-                    "id": "turning" if turns else "sliding",
-                    "title": name,
-                    "note": "By the names of the URDF, at the waypoints.",
-                    "unit": unit,
-                    "axis": f"value [{unit.strip()}]",
-                    "limits": [],
-                    "series": [
-                        series(joints[k].name, colours[k], factor * q[:, k])
-                        for k in mine
-                    ],
-                }
-            )
+            lines = [
+                series(joint.name, colours[k], factor * q[:, k])
+                for k, joint in enumerate(joints)
+                if joint.turns is turns
+            ]
+            if lines:
+                charts.append(chart(title, f"value [{unit}]", lines, note, id=kind))
         return charts
 
 

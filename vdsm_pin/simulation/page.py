@@ -6,7 +6,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.schema_types import FileModel
-from vdsm_pin.report.charts import limit, packed, series
+from vdsm_pin.report.charts import chart, packed, series
 from vdsm_pin.report.html import rendered
 from vdsm_pin.report.page_data import embedded
 from vdsm_pin.report.palette import AXES, link_colours
@@ -76,51 +76,32 @@ def charts(found: Simulation, settings: Settings) -> list[dict[str, Any]]:
     """Every plot of the page, in order, as `plots.js` draws it."""
     cables, slack = settings.cables, 100.0 * (found.tensions < SLACK).mean(axis=1)
     stiffness, margin = found.least_stiffness[:, 1], found.tension_margin[:, 1]
-    band = {f"+{BAND_DEG}°": BAND_DEG, f"−{BAND_DEG}°": -BAND_DEG}
-    held = {
-        "largest allowed": cables.largest_tension_n,
-        "least held": cables.least_tension_n,
-    }
+    band = (f"+{BAND_DEG}°", BAND_DEG), (f"−{BAND_DEG}°", -BAND_DEG)
+    most, least = cables.largest_tension_n, cables.least_tension_n
+    held, buckles = (("largest allowed", most), ("least held", least)), ("buckles", 0.0)
     tensions = [
         series("largest", AXES["x"], found.tensions.max(axis=1)),
         series("mean", ACCENT, found.tensions.mean(axis=1)),
         series("least", AXES["y"], found.tensions.min(axis=1)),
     ]
     return [
-        _chart("Joint errors", "error [°]", _errors(found), band,
-               "Executed less planned; the band is the paper's main range (Fig. 21)."),
-        _chart("Yaw angles α", "α [°]", _angles(found, "α"), {}, FOLLOWED),
-        _chart("Pitch angles θ", "θ [°]", _angles(found, "θ"), {}, FOLLOWED),
-        _chart("Tensions of the cables", "tension [N]", tensions, held,
-               "Of all cables."),
-        _chart("Slack cables", "cables [%]", [series("slack", ACCENT, slack)], {},
-               f"Cables with less than {SLACK:g} N, of all."),
-        _chart("Least joint stiffness", "stiffness [Nm/rad]",
-               [series("least", ACCENT, stiffness)], {"buckles": 0.0},
-               "Of the arm held by its cables at the planned tensions."),
-        _chart("Tension that may be added to every cable", "tension [N]",
-               [series("margin", ACCENT, margin)], {"buckles": 0.0},
-               "Before the arm buckles, or a cable has its largest tension."),
+        chart("Joint errors", "error [°]", _errors(found),
+              "Executed less planned; the band is the paper's main range (Fig. 21).",
+              band),
+        chart("Yaw angles α", "α [°]", _angles(found, "α"), FOLLOWED),
+        chart("Pitch angles θ", "θ [°]", _angles(found, "θ"), FOLLOWED),
+        chart("Tensions of the cables", "tension [N]", tensions, "Of all cables.",
+              held),
+        chart("Slack cables", "cables [%]", [series("slack", ACCENT, slack)],
+              f"Cables with less than {SLACK:g} N, of all."),
+        chart("Least joint stiffness", "stiffness [Nm/rad]",
+              [series("least", ACCENT, stiffness)],
+              "Of the arm held by its cables at the planned tensions.", [buckles]),
+        chart("Tension that may be added to every cable", "tension [N]",
+              [series("margin", ACCENT, margin)],
+              "Before the arm buckles, or a cable has its largest tension.",
+              [buckles]),
     ]  # fmt: skip
-
-
-def _chart(
-    title: str,
-    axis: str,
-    lines: list[dict[str, Any]],
-    limits: dict[str, float],
-    note: str,
-) -> dict[str, Any]:
-    unit = axis.partition("[")[2].rstrip("]")
-    return {
-        "id": title,
-        "title": title,
-        "note": note,
-        "unit": unit if unit == "°" else f" {unit}",
-        "axis": axis,
-        "limits": [limit(label, value) for label, value in limits.items()],
-        "series": lines,
-    }
 
 
 def _errors(found: Simulation) -> list[dict[str, Any]]:
