@@ -255,9 +255,9 @@ def write_report(result: Verification, path: str | Path) -> None:
     from vdsm_pin.report.html import write_report as write
     from vdsm_pin.report.run_record import RunRecord
 
-    subject, source = _judged(result), result.problem.source
-    record = RunRecord.of(PYTHON, source, subject.urdf_sha256)
-    check_kept([path_of(path)], () if source is None else source.files)
+    urdf, problem = _judged(result).urdf_sha256, result.problem
+    record = RunRecord(PYTHON, problem.sha256, urdf_sha256=urdf)
+    check_kept([path_of(path)], problem.files)
     with atomic_path(path) as temporary:
         write(temporary, result, verification_file(result, record))
 

@@ -144,9 +144,8 @@ def plan_to_folder(
 
     _check_plannable(problem)
     check_outputs(problem.files, folder=folder, names=PLANNED)
-    model = load_arm(problem.manipulator)
-    date = now() if report else None
-    record = RunRecord.of(command, problem.source, model.urdf_sha256, date=date)
+    urdf, date = load_arm(problem.manipulator).urdf_sha256, now() if report else None
+    record = RunRecord(command, problem.sha256, urdf_sha256=urdf, date=date)
     with naming_earlier(folder / PLAN):
         try:
             refinement = plan_and_verify(problem, strategy, deadline=deadline)
@@ -253,8 +252,8 @@ def verify_into(order: VerifyOrder, given: Given, staging: Path) -> Verified:
     step("writing the results")
     subject.write_tables(staging, verification)
     check_unchanged(order.trajectory, digest)
-    source, urdf = order.problem.source, subject.urdf_sha256
-    record = RunRecord.of(order.command, source, urdf, digest, order.date)
+    hashes = order.problem.sha256, digest, subject.urdf_sha256
+    record = RunRecord(order.command, *hashes, order.date)
     file = verification_file(verification, record)
     (staging / VERIFICATION).write_text(file.text(), encoding="utf-8")
     plan = planned_by(order.trajectory)

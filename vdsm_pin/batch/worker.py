@@ -63,7 +63,7 @@ def _performed(task: Task) -> Done:
     try:
         with enforced(deadline, grace=0.0):
             problem = _read(task)
-            digest = problem.source.sha256 if problem.source else ""
+            digest = problem.sha256
             _check_apart(task, problem)
             if task.settings.resume:
                 kept = finished(task, digest, asked)

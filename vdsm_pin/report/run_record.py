@@ -11,7 +11,6 @@ from importlib import import_module, metadata
 from typing import Final
 
 from vdsm_pin import __version__
-from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.text import printable
 
 _LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "yourdfpy", "meshcat")
@@ -37,19 +36,6 @@ class RunRecord:
     trajectory_sha256: str = ""
     urdf_sha256: str = ""
     date: str | None = None
-
-    @classmethod
-    def of(
-        cls,
-        command: str,
-        source: ProblemSource | None,
-        urdf_sha256: str,
-        trajectory_sha256: str = "",
-        date: str | None = None,
-    ) -> "RunRecord":
-        """The record of a run on a problem of these files, if it is of any."""
-        sha256 = source.sha256 if source else ""
-        return cls(command, sha256, trajectory_sha256, urdf_sha256, date)
 
     def __post_init__(self) -> None:
         """Spell what a file cannot hold: paths need not be text."""
