@@ -8,11 +8,13 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.app.arm_subject import CABLES, CENTRES
+from vdsm_pin.app.motions import Motion
+from vdsm_pin.app.subjects import ProblemOrCell, subject_of
 from vdsm_pin.app.workflow import TRAJECTORY
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.bags import check_topic, is_bag, read_bag, write_bag
-from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory, text_of
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
@@ -20,12 +22,10 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory, joint_names
 from vdsm_pin.report.folder import check_outputs, staged
 from vdsm_pin.report.tables import write_cables, write_centres
-from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.trajectory_files import read_motion
 
 CONVERTED: Final = TRAJECTORY, CENTRES, CABLES
-"""What a conversion writes to its folder."""
+"""What a conversion of a snake arm's motion writes to its folder."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,15 @@ class MotionFile:
             raise InvalidInput(message)
         return given[0]
 
-    def read(self, problem: PlanningProblem) -> Trajectory:
+    def read(self, problem: ProblemOrCell) -> Motion:
         """The motion it describes.
 
         Raises:
-            InvalidFile: If it breaks its contract or no posture of the arm fits it.
+            InvalidFile: If it breaks its contract or no posture fits it.
         """
+        if not isinstance(problem, PlanningProblem):
+            robot = problem.robot
+            return read_motion(self.file, robot.joints, self.topic, robot.values)
         check_topic(self.file, self.topic)
         if self.centres is not None:
             return read_centres(self.centres, problem)
@@ -77,13 +80,13 @@ class MotionFile:
 
 
 def convert_to_folder(
-    problem: PlanningProblem, given: MotionFile, folder: Path, also: Sequence[str] = ()
-) -> Trajectory:
-    """Write one motion as angles, as joint centres and as cable lengths.
+    problem: ProblemOrCell, given: MotionFile, folder: Path, also: Sequence[str] = ()
+) -> Motion:
+    """Write one motion as angles; of a snake arm as joint centres and cables too.
 
     Args:
-        problem: For its arm and frame.
-        given: The file to convert.
+        problem: For its arm and frame, or its robot.
+        given: The file to convert; of any other robot a trajectory.
         folder: Where the files go.
         also: Formats that the angles are written in too, as a JointTrajectory: yaml,
             json, mcap (ROS 2) or bag (ROS 1).
@@ -94,44 +97,18 @@ def convert_to_folder(
     Raises:
         InvalidInput: If the file is bad or the folder cannot be written.
     """
-    file = given.file
-    names = (*CONVERTED, *map(message_name, also))
-    check_outputs([*problem.files, file], folder=folder, names=names)
+    of_arm = isinstance(problem, PlanningProblem)
+    names = *(CONVERTED if of_arm else (TRAJECTORY,)), *map(message_name, also)
+    check_outputs([*problem.files, given.file], folder=folder, names=names)
     motion = given.read(problem)
     with staged(folder) as staging:
-        write_trajectory(staging / TRAJECTORY, motion)
-        write_centres(staging / CENTRES, problem, motion)
-        write_cables(staging / CABLES, problem, motion)
-        write_messages(staging, motion.named, also)
+        subject_of(problem).write(staging / TRAJECTORY, motion)
+        if isinstance(problem, PlanningProblem) and isinstance(motion, Trajectory):
+            write_centres(staging / CENTRES, problem, motion)
+            write_cables(staging / CABLES, problem, motion)
+        named = motion.named if isinstance(motion, Trajectory) else motion
+        write_messages(staging, named, also)
     return motion
-
-
-def convert_robot(
-    cell: Cell, given: MotionFile, folder: Path, also: Sequence[str]
-) -> int:
-    """Write a robot's trajectory of any format as trajectory.csv, and in others.
-
-    Args:
-        cell: The robot.
-        given: Its trajectory.
-        folder: Where the files go.
-        also: Formats besides, as of `convert_to_folder`.
-
-    Returns:
-        The number of waypoints.
-
-    Raises:
-        InvalidInput: If the file is bad or the folder cannot be written.
-    """
-    file = given.file
-    names = (TRAJECTORY, *map(message_name, also))
-    check_outputs([*cell.files, file], folder=folder, names=names)
-    robot = cell.robot
-    motion = read_motion(file, robot.joints, given.topic, robot.values)
-    with staged(folder) as staging:
-        (staging / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")
-        write_messages(staging, motion, also)
-    return motion.n_samples
 
 
 def message_name(ending: str) -> str:

@@ -175,20 +175,17 @@ def convert(
     trajectory.csv, centres.csv and cables.csv. Of a robot (problem with robot) it
     takes a trajectory of any format and writes trajectory.csv. Nothing is judged.
     """
-    from vdsm_pin.app.conversion import MotionFile, convert_robot, convert_to_folder
+    from vdsm_pin.app.conversion import MotionFile, convert_to_folder
     from vdsm_pin.app.subjects import read_problem_or_cell
     from vdsm_pin.problem.planning_problem import PlanningProblem
 
     given = MotionFile(trajectory, centres, cables, topic)
     more = [one.value for one in also or ()]
-    notes: tuple[str, ...] = ()
     asked = read_problem_or_cell(problem)
-    if isinstance(asked, PlanningProblem):
-        motion = convert_to_folder(asked, given, out, more)
-        count, notes = motion.n_samples, motion.notes
-    else:
+    if not isinstance(asked, PlanningProblem):
         refuse_beside("a robot", {"--centres": centres, "--cables": cables})
-        count = convert_robot(asked, given, out, more)
+    motion = convert_to_folder(asked, given, out, more)
+    count, notes = motion.n_samples, motion.notes
     lines = [printable(f"note: {note}") for note in notes]
     lines.append(f"wrote {count} waypoints to {out}")
     answer.tell("\n".join(lines), waypoints=count, folder=out, notes=notes)
