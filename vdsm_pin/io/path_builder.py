@@ -10,16 +10,9 @@ import numpy as np
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry import curves
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.io import path_schema as schema
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import without_repeats
-from vdsm_pin.io.path_schema import (
-    ArcPart,
-    CirclePart,
-    FilePart,
-    PathPart,
-    SplinePart,
-    TipPathModel,
-)
 from vdsm_pin.io.posture_field import PostureBuilder
 from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.source import Digest, read_bytes
@@ -39,7 +32,7 @@ DEFAULT_SPACING: Final = 0.010
 """The paper's spacing of waypoints; [m]."""
 
 
-def spacing_of(model: TipPathModel, frame: Frame) -> float:
+def spacing_of(model: schema.TipPathModel, frame: Frame) -> float:
     """The spacing of a path, or the default one; [m]."""
     if model.spacing is None:
         return DEFAULT_SPACING
@@ -68,7 +61,7 @@ def read_points(path: Path, digest: Digest) -> FloatArray:
 class PathBuilder(PostureBuilder):
     """Converts the tip path and refuses spacings that make no sense."""
 
-    def build(self, model: TipPathModel) -> DesiredPath:
+    def build(self, model: schema.TipPathModel) -> DesiredPath:
         """The desired path in the base frame.
 
         Raises:
@@ -103,20 +96,22 @@ class PathBuilder(PostureBuilder):
         self._check_rows(path)
         return path
 
-    def _points(self, model: TipPathModel) -> FloatArray:
+    def _points(self, model: schema.TipPathModel) -> FloatArray:
         """All corners in the base frame, shape (n, 3); [m]."""
         corners, parts = self._corners(model)
         points = self.frame.point(corners)
         self._check_points(points, "points", parts)
         return points
 
-    def _insertion(self, model: TipPathModel) -> FloatArray:
+    def _insertion(self, model: schema.TipPathModel) -> FloatArray:
         """Places on the way to the path, in the base frame, shape (n, 3); [m]."""
         places = self.frame.point(np.array(model.insertion).reshape(-1, 3))
         self._check_points(places, "insertion", np.arange(len(places)))
         return places
 
-    def _pointing(self, model: TipPathModel, points: FloatArray) -> Pointing | None:
+    def _pointing(
+        self, model: schema.TipPathModel, points: FloatArray
+    ) -> Pointing | None:
         """Where the last link looks, in the base frame.
 
         Args:
@@ -139,7 +134,7 @@ class PathBuilder(PostureBuilder):
                 return Pointing(cone, directions=one)
             return Pointing(cone, directions=self._directions(model, points))
 
-    def _directions(self, model: TipPathModel, points: FloatArray) -> FloatArray:
+    def _directions(self, model: schema.TipPathModel, points: FloatArray) -> FloatArray:
         """A direction for each corner, the closing one included, shape (m, 3)."""
         assert model.pointing is not None
         given = model.pointing.directions or []
@@ -157,7 +152,7 @@ class PathBuilder(PostureBuilder):
             turned = np.concatenate([turned, turned[:1]])
         return turned
 
-    def _corners(self, model: TipPathModel) -> tuple[FloatArray, IntArray]:
+    def _corners(self, model: schema.TipPathModel) -> tuple[FloatArray, IntArray]:
         """All corners, shape (n, 3) in the file's frame, and whose part each is."""
         tolerance = model.curve_tolerance
         if tolerance is None:
@@ -169,32 +164,32 @@ class PathBuilder(PostureBuilder):
                 with self.document.naming(at):
                     made.append(self._part(part, before, tolerance))
             except InvalidFile as error:
-                if not isinstance(part, FilePart):
+                if not isinstance(part, schema.FilePart):
                     raise
                 raise self.document.invalid_file(at, part.file, error) from None
         counts = [len(corners) for corners in made]
         return np.concatenate(made), np.repeat(np.arange(len(made)), counts)
 
     def _part(
-        self, part: PathPart, before: FloatArray | None, tolerance: float
+        self, part: schema.PathPart, before: FloatArray | None, tolerance: float
     ) -> FloatArray:
         """Corners of a point or of a curve after the point before, shape (n, 3)."""
         if isinstance(part, list):
             return np.array([part])
-        if isinstance(part, FilePart):
+        if isinstance(part, schema.FilePart):
             return self.reading.read(part.file, read_points)
         if before is None:
             message = "has no point before it, expected one to begin at"
             raise InvalidInput(message)
         match part:
-            case ArcPart(arc=arc):
+            case schema.ArcPart(arc=arc):
                 through, end = np.array(arc.through), np.array(arc.to)
                 return curves.arc_through(before, through, end, tolerance)
-            case CirclePart(circle=circle):
+            case schema.CirclePart(circle=circle):
                 centre, normal = np.array(circle.center), np.array(circle.normal)
                 turn = float(np.deg2rad(circle.turn_deg))
                 return curves.circle_from(before, centre, normal, turn, tolerance)
-            case SplinePart(spline=points):
+            case schema.SplinePart(spline=points):
                 through = np.vstack([before[None], np.array(points)])
                 return curves.spline_through(through, tolerance)
 

@@ -9,25 +9,11 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.bodies import LeftOut
+from vdsm_pin.report import rows
 from vdsm_pin.report.files import BatchRow, PlanFile, VerificationFile
 from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
 from vdsm_pin.report.motion_facts import motion_facts
 from vdsm_pin.report.reason import nearest_to_obstacle, plan_reason, reason
-from vdsm_pin.report.rows import (
-    AdjustmentRow,
-    CheckRow,
-    ClosestRow,
-    CounterexampleRow,
-    ErrorBoxRow,
-    Hashes,
-    JointErrorRow,
-    LeftOutRow,
-    MinClearance,
-    MotionFacts,
-    ObstacleErrorRow,
-    Point,
-    ToleranceRow,
-)
 from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.words import finite
 from vdsm_pin.tolerances import TOLERANCES, UNITS
@@ -47,7 +33,7 @@ if TYPE_CHECKING:  # whoever verifies needs no planner
     from vdsm_pin.refinement import Refinement
 
 
-def in_file_frame(verification: Verification, point: FloatArray) -> Point | None:
+def in_file_frame(verification: Verification, point: FloatArray) -> rows.Point | None:
     """A point of the base frame in the frame of the problem file; [m]."""
     pose = verification.problem.T_world_base
     moved = pose[:3, :3] @ point + pose[:3, 3]
@@ -56,13 +42,13 @@ def in_file_frame(verification: Verification, point: FloatArray) -> Point | None
     return float(moved[0]), float(moved[1]), float(moved[2])
 
 
-def check_row(check: Check, time: float | None = None) -> CheckRow:
+def check_row(check: Check, time: float | None = None) -> rows.CheckRow:
     """One check as its row, with the time of its moment where that is known; [s]."""
     known = asdict(check) | {"verdict": check.verdict.value}
     known = {k: finite(v) if isinstance(v, float) else v for k, v in known.items()}
     for name in ("too_close_intervals", "too_close_stretches"):
         known[name] = known[name] or None  # 0: not counted
-    return CheckRow(**known, time_s=time)
+    return rows.CheckRow(**known, time_s=time)
 
 
 def _both(pair: Pair) -> dict[str, Any]:
@@ -71,9 +57,11 @@ def _both(pair: Pair) -> dict[str, Any]:
     return facts | {"link": pair.link}
 
 
-def closest_row(verification: Verification, approach: ClosestApproach) -> ClosestRow:
+def closest_row(
+    verification: Verification, approach: ClosestApproach
+) -> rows.ClosestRow:
     """One closest approach as its row."""
-    return ClosestRow(
+    return rows.ClosestRow(
         interval=approach.interval,
         moment=approach.moment,
         time_s=verification.time_at(approach.moment),
@@ -90,9 +78,9 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
 
 def counterexample_row(
     verification: Verification, found: Counterexample, **joints: Any
-) -> CounterexampleRow:
+) -> rows.CounterexampleRow:
     """One counterexample as its row, with its joints and their errors."""
-    return CounterexampleRow(
+    return rows.CounterexampleRow(
         moment=found.moment,
         **_both(found.pair),
         clearance_m=found.clearance,
@@ -106,7 +94,7 @@ def counterexample_row(
 
 def _arm_counterexample(
     verification: ArmVerification, found: Counterexample
-) -> CounterexampleRow:
+) -> rows.CounterexampleRow:
     joints, errors = found.joints.tolist(), found.offsets.tolist()
     return counterexample_row(
         verification,
@@ -118,43 +106,43 @@ def _arm_counterexample(
     )
 
 
-def error_box(errors: ErrorBox, n_links: int | None = None) -> ErrorBoxRow:
+def error_box(errors: ErrorBox, n_links: int | None = None) -> rows.ErrorBoxRow:
     """The errors in words of the JSON file; of a robot without a number of links."""
     angles = np.array([[errors.joint]]) if n_links is None else errors.angles(n_links)
     alike = bool((angles == angles.flat[0]).all())
     single = (errors.of_obstacle(one.name) for one in errors.obstacles)
-    return ErrorBoxRow(
+    return rows.ErrorBoxRow(
         joint_error_rad=float(angles.max()),
         joints_rad=() if alike else tuple((float(a), float(t)) for a, t in angles),
         base_error_m=errors.base,
         base_error_rad=errors.base_turn,
         obstacle_error_m=errors.obstacle,
         obstacles=tuple(
-            ObstacleErrorRow(name=one.name, shift_m=one.shift, turn_rad=one.turn)
+            rows.ObstacleErrorRow(name=one.name, shift_m=one.shift, turn_rad=one.turn)
             for one in single
         ),
         slide_error_m=errors.slide,
         named=tuple(
-            JointErrorRow(name=one.name, turn_rad=one.turn, shift_m=one.shift)
+            rows.JointErrorRow(name=one.name, turn_rad=one.turn, shift_m=one.shift)
             for one in errors.named
         ),
     )
 
 
-def left_out_rows(left_out: Sequence[LeftOut]) -> tuple[LeftOutRow, ...]:
+def left_out_rows(left_out: Sequence[LeftOut]) -> tuple[rows.LeftOutRow, ...]:
     """The bodies of an arm, and the obstacles, that are not held apart."""
-    return tuple(LeftOutRow(**asdict(one)) for one in left_out)
+    return tuple(rows.LeftOutRow(**asdict(one)) for one in left_out)
 
 
-def min_clearance(verification: Verification) -> MinClearance | None:
+def min_clearance(verification: Verification) -> rows.MinClearance | None:
     """The smallest clearance from any obstacle; None where there is no obstacle."""
     index = nearest_to_obstacle(verification)
     if index is None:
         return None
     row = closest_row(verification, verification.approaches[index])
-    known = row.model_dump(include=set(MinClearance.model_fields))
+    known = row.model_dump(include=set(rows.MinClearance.model_fields))
     least = finite(verification.min_clearance)
-    return MinClearance.model_validate(known | {"lower_m": least})
+    return rows.MinClearance.model_validate(known | {"lower_m": least})
 
 
 def _own_facts(verification: Verification) -> dict[str, Any]:
@@ -213,7 +201,7 @@ def verification_file(
         nominal_clear=verification.nominal_clear
         if verification.counterexamples
         else None,
-        hashes=Hashes.model_validate(record, from_attributes=True),
+        hashes=rows.Hashes.model_validate(record, from_attributes=True),
         versions=versions(),
         machine=machine(),
         tolerances=tolerances(),
@@ -221,17 +209,19 @@ def verification_file(
     )
 
 
-def tolerances() -> dict[str, ToleranceRow]:
+def tolerances() -> dict[str, rows.ToleranceRow]:
     """Every tolerance in force, by name, with its unit."""
     values = asdict(TOLERANCES)
-    return {name: ToleranceRow(value=values[name], unit=UNITS[name]) for name in values}
+    return {
+        name: rows.ToleranceRow(value=values[name], unit=UNITS[name]) for name in values
+    }
 
 
 def _adjustment_row(
     verification: ArmVerification, number: int, one: "Adjustment"
-) -> AdjustmentRow:
+) -> rows.AdjustmentRow:
     """What a link missed after a round."""
-    points: dict[str, Point | None] = {}
+    points: dict[str, rows.Point | None] = {}
     if one.miss is not None:
         turned = verification.problem.T_world_base[:3, :3] @ one.miss.normal
         points = {
@@ -239,7 +229,7 @@ def _adjustment_row(
             "other_point_m": in_file_frame(verification, one.miss.on_obstacle),
             "normal": (float(turned[0]), float(turned[1]), float(turned[2])),
         }
-    return AdjustmentRow(
+    return rows.AdjustmentRow(
         round=number,
         moment=one.moment,
         link=one.link,
@@ -278,7 +268,7 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
         error_box=error_box(verification.errors, plan.trajectory.n_links),
         coverage=finite(verification.coverage),
         motion=motion_facts(plan.problem, plan.trajectory),
-        hashes=Hashes.model_validate(record, from_attributes=True),
+        hashes=rows.Hashes.model_validate(record, from_attributes=True),
         versions=versions(),
         command=record.command,
     )
@@ -288,7 +278,7 @@ def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
     """The row of one verified problem."""
     smallest, motion = file.min_clearance, file.motion
     of_arm: dict[str, float | None] = {}
-    if isinstance(motion, MotionFacts):
+    if isinstance(motion, rows.MotionFacts):
         of_arm = {
             "max_link_angle_rad": max(motion.max_link_angle_rad),
             "changed_angles_mean_on_path": motion.changed_angles_mean_on_path,

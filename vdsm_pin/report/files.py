@@ -8,23 +8,7 @@ from pydantic import Field, FiniteFloat
 
 from vdsm_pin.errors import UnknownName
 from vdsm_pin.io.problem_file import SCHEMA_DIALECT, problem_schema
-from vdsm_pin.report.rows import (
-    CHANGED,
-    LINK,
-    AdjustmentRow,
-    CheckRow,
-    ClosestRow,
-    CounterexampleRow,
-    ErrorBoxRow,
-    Hashes,
-    LeftOutRow,
-    MinClearance,
-    MotionFacts,
-    ResultModel,
-    RobotFacts,
-    ToleranceRow,
-    VerdictWord,
-)
+from vdsm_pin.report import rows
 
 OutcomeWord = Literal[
     "certified",
@@ -49,7 +33,7 @@ _VERSIONS: Final = "of everything a number may depend on"
 _COMMAND: Final = "exact command line"
 
 
-class VerificationFile(ResultModel):
+class VerificationFile(rows.ResultModel):
     """verification.json."""
 
     vdsm_verification: Literal[1] = Field(
@@ -61,16 +45,18 @@ class VerificationFile(ResultModel):
         description="when it was verified, in UTC; null in a batch, whose files are "
         "the same from run to run",
     )
-    verdict: VerdictWord
+    verdict: rows.VerdictWord
     reason: str = Field(description="the verdict in one sentence")
     assumed_sizes: tuple[str, ...] = Field(description=_ASSUMED)
     notes: tuple[str, ...] = Field(description=_NOTES)
-    checks: tuple[CheckRow, ...] = Field(description="every check, in a fixed order")
-    min_clearance: MinClearance | None = Field(
+    checks: tuple[rows.CheckRow, ...] = Field(
+        description="every check, in a fixed order"
+    )
+    min_clearance: rows.MinClearance | None = Field(
         description="smallest clearance from an obstacle; null where there is none"
     )
     required_clearance_m: FiniteFloat = Field(description="asked for by the problem")
-    closest: tuple[ClosestRow, ...] = Field(
+    closest: tuple[rows.ClosestRow, ...] = Field(
         description="ten closest approaches, obstacles first, each pair once"
     )
     coverage: FiniteFloat | None = Field(description=_COVERAGE)
@@ -80,7 +66,7 @@ class VerificationFile(ResultModel):
     undrawn_m: tuple[tuple[FiniteFloat, FiniteFloat], ...] = Field(
         description="stretches of the desired path not drawn: arc lengths from and to"
     )
-    error_box: ErrorBoxRow
+    error_box: rows.ErrorBoxRow
     max_joint_error_rad: FiniteFloat | None = Field(description=_JOINT_ERROR)
     refuted_joint_error_rad: FiniteFloat | None = Field(
         description="smallest joint error found that loses the clearance; null: none"
@@ -91,10 +77,10 @@ class VerificationFile(ResultModel):
     not_done: tuple[str, ...] = Field(
         description="what the time limit left out besides checks, which have their rows"
     )
-    left_out: tuple[LeftOutRow, ...] = Field(
+    left_out: tuple[rows.LeftOutRow, ...] = Field(
         description="bodies that are not held apart, with a reason each"
     )
-    counterexamples: tuple[CounterexampleRow, ...] = Field(
+    counterexamples: tuple[rows.CounterexampleRow, ...] = Field(
         description="errors within the box that lose the clearance where it is refuted "
         "for the box alone: one against obstacles, one between links, at most"
     )
@@ -102,23 +88,23 @@ class VerificationFile(ResultModel):
         description="whether the motion without errors is proved clear; null where "
         "there is no counterexample"
     )
-    motion: MotionFacts | RobotFacts = Field(
+    motion: rows.MotionFacts | rows.RobotFacts = Field(
         description="what an arm, or any other robot, does at the waypoints"
     )
-    hashes: Hashes
+    hashes: rows.Hashes
     versions: dict[str, str] = Field(description=_VERSIONS)
     machine: str = Field(description="system, architecture, processors")
-    tolerances: dict[str, ToleranceRow] = Field(description="in force, by name")
+    tolerances: dict[str, rows.ToleranceRow] = Field(description="in force, by name")
     command: str = Field(description=_COMMAND)
 
 
-class PlanFile(ResultModel):
+class PlanFile(rows.ResultModel):
     """plan.json."""
 
     vdsm_plan: Literal[1] = Field(default=1, description="version of this format")
     problem: str = Field(description=_PROBLEM)
     strategy: str = Field(description=_STRATEGY)
-    verdict: VerdictWord
+    verdict: rows.VerdictWord
     reason: str = Field(description="the verdict in one sentence")
     undrawn: tuple[str, ...] = Field(
         description="stretches of the desired path not drawn, and why"
@@ -131,7 +117,7 @@ class PlanFile(ResultModel):
         description="rounds of plan, measure, verify, larger margins; a lift after "
         "which joints were moved on is one too"
     )
-    adjustments: tuple[AdjustmentRow, ...] = Field(
+    adjustments: tuple[rows.AdjustmentRow, ...] = Field(
         default=(),
         description="what was missed after each round: margins raised, joints moved",
     )
@@ -139,17 +125,17 @@ class PlanFile(ResultModel):
         default=None,
         description="largest distance of a planned joint centre from Pinocchio's",
     )
-    error_box: ErrorBoxRow = Field(
-        default=ErrorBoxRow(), description="errors that the plan was made for"
+    error_box: rows.ErrorBoxRow = Field(
+        default=rows.ErrorBoxRow(), description="errors that the plan was made for"
     )
     coverage: FiniteFloat | None = Field(description=_COVERAGE)
-    motion: MotionFacts
-    hashes: Hashes
+    motion: rows.MotionFacts
+    hashes: rows.Hashes
     versions: dict[str, str] = Field(description=_VERSIONS)
     command: str = Field(description=_COMMAND)
 
 
-class BatchRow(ResultModel):
+class BatchRow(rows.ResultModel):
     """One problem of a batch; what summary.csv shows."""
 
     folder: str = Field(
@@ -168,7 +154,9 @@ class BatchRow(ResultModel):
     min_clearance_upper_m: FiniteFloat | None = Field(
         default=None, description="the same, proved upper bound"
     )
-    closest_link: int | None = Field(default=None, description=f"where it is; {LINK}")
+    closest_link: int | None = Field(
+        default=None, description=f"where it is; {rows.LINK}"
+    )
     closest_obstacle: str | None = Field(
         default=None, description="and to which obstacle"
     )
@@ -177,7 +165,7 @@ class BatchRow(ResultModel):
         default=None, description="largest link angle psi of any joint"
     )
     changed_angles_mean_on_path: FiniteFloat | None = Field(
-        default=None, description=CHANGED
+        default=None, description=rows.CHANGED
     )
     max_joint_error_rad: FiniteFloat | None = Field(
         default=None, description=_JOINT_ERROR
@@ -192,7 +180,7 @@ class BatchRow(ResultModel):
     reason: str = Field(default="", description="the outcome in one sentence")
 
 
-class ManifestFile(ResultModel):
+class ManifestFile(rows.ResultModel):
     """manifest.json of one problem's folder; a folder with it is finished."""
 
     vdsm_manifest: Literal[1] = Field(default=1, description="version of this format")
@@ -202,7 +190,7 @@ class ManifestFile(ResultModel):
     files: dict[str, str] = Field(description="SHA-256 by file name")
 
 
-class TimingFile(ResultModel):
+class TimingFile(rows.ResultModel):
     """timing.json of one problem's folder, the only file that differs between runs."""
 
     seconds: FiniteFloat = Field(description="time spent on the problem")
@@ -215,7 +203,7 @@ def _certificate_schema() -> dict[str, Any]:
     return certificate_schema()
 
 
-_MODELS: Final[dict[str, type[ResultModel]]] = {
+_MODELS: Final[dict[str, type[rows.ResultModel]]] = {
     "verification": VerificationFile,
     "plan": PlanFile,
     "manifest": ManifestFile,

@@ -12,9 +12,10 @@ import jinja2.compiler
 from jinja2.bccache import Bucket
 from markupsafe import Markup, escape
 
-from vdsm_pin import __version__, kept
+from vdsm_pin import __version__, kept, units
 from vdsm_pin.errors import NoPlanFound, OutOfTime, VdsmError, VerificationFailed
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.report import words
 from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.files import BatchRow, PlanFile, VerificationFile
 from vdsm_pin.report.impasse import impasse_of
@@ -24,34 +25,6 @@ from vdsm_pin.report.reason import failing, left_out_words, nearest_to_obstacle
 from vdsm_pin.report.rows import Point
 from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.thinning import MOST_DRAWN
-from vdsm_pin.report.words import (
-    OUTCOMES,
-    TIME_LIMIT,
-    at_least,
-    at_most,
-    check_cells,
-    counted,
-    depth,
-    errors,
-    finite,
-    kept_at_least,
-    limit,
-    lost,
-    mean_count,
-    outcome,
-    place,
-    survived,
-    term,
-)
-from vdsm_pin.units import (
-    MISSING,
-    measured,
-    measured_at_most,
-    percent,
-    percent_at_most,
-    point_mm,
-    quantity,
-)
 from vdsm_pin.verification.records import ArmVerification, Verification
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -91,16 +64,18 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = [quantity, depth, at_least, at_most, check_cells, limit, percent,
-               percent_at_most,
-               errors, outcome, mean_count, measured, measured_at_most, survived,
-               lost, kept_at_least, counted, term, place, assumption, point, css_text,
-               scene_words, sentence]  # fmt: skip
+    filters = [
+        *(words.at_least, words.at_most, words.check_cells, words.counted, words.depth),
+        *(words.errors, words.kept_at_least, words.limit, words.lost, words.mean_count),
+        *(words.outcome, words.place, words.survived, words.term, units.quantity),
+        *(units.measured, units.measured_at_most, units.percent, units.percent_at_most),
+        *(assumption, css_text, point, scene_words, sentence),
+    ]
     environment.filters |= {one.__name__: one for one in filters}
     environment.globals |= {
         "asset": _asset,
         "meshcat": _meshcat,
-        "outcomes": OUTCOMES,
+        "outcomes": words.OUTCOMES,
         "vdsm_version": __version__,
     }
     return environment
@@ -124,7 +99,7 @@ def _meshcat() -> str:
 
 def point(point: Point | None) -> str:
     """A point in mm."""
-    return MISSING if point is None else point_mm(point)
+    return units.MISSING if point is None else units.point_mm(point)
 
 
 def sentence(text: str) -> Markup:
@@ -179,7 +154,9 @@ def write_report(
         obstacles=scene_rows(verification.problem),
         drawn=data.triangles,
         worst=nearest_to_obstacle(verification),
-        first_bad=next((finite(one.moment) for one in failing(verification)), None),
+        first_bad=next(
+            (words.finite(one.moment) for one in failing(verification)), None
+        ),
         left_out=left_out_words(file.left_out),
         held=any(pair.obstacle for pair in verification.pairs),
         index=index,
@@ -238,7 +215,7 @@ def write_no_plan(
         "no_plan.html.j2",
         problem=problem,
         place=place,
-        outcome_word=TIME_LIMIT if isinstance(error, OutOfTime) else "infeasible",
+        outcome_word=words.TIME_LIMIT if isinstance(error, OutOfTime) else "infeasible",
         message=str(error),
         searched=isinstance(error, NoPlanFound | OutOfTime),
         strategy=strategy,
@@ -265,8 +242,8 @@ def write_index(path: Path, rows: Sequence[BatchRow], pages: Mapping[str, str]) 
         rows: One per problem.
         pages: The page of each problem that has one, by its folder.
     """
-    counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
-    passed = sum(count for word, count in counts.items() if outcome(word).passed)
+    counts = {word: sum(row.outcome == word for row in rows) for word in words.OUTCOMES}
+    passed = sum(count for word, count in counts.items() if words.outcome(word).passed)
     page = rendered(
         "index.html.j2",
         rows=rows,
