@@ -7,40 +7,31 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import (
-    NOT_PASSED,
-    PASSED,
-    Answer,
-    OutFolder,
-    ProblemArgument,
-    Trajectory,
-    examples,
-    family,
-    grouped,
-    option,
-)
+from vdsm_pin.cli import options
 from vdsm_pin.cli.robot import Topic, refuse_beside
 from vdsm_pin.text import printable
 
-commands = family()
+commands = options.family()
 
 
 @commands.command(
     "check-certificate",
-    epilog=examples("vdsm check-certificate mine.certificate mine.yaml mine.csv"),
+    epilog=options.examples(
+        "vdsm check-certificate mine.certificate mine.yaml mine.csv"
+    ),
 )
-@grouped
+@options.grouped
 def check_certificate(
     certificate: Annotated[
         Path,
         typer.Argument(metavar="FILE", help="Written by vdsm verify --certificate."),
     ],
-    problem: ProblemArgument,
+    problem: options.ProblemArgument,
     trajectory: Annotated[
         Path, typer.Argument(metavar="TRAJECTORY", help="The motion that it is about.")
     ],
     *,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Recheck a certificate.
 
@@ -54,7 +45,7 @@ def check_certificate(
     if answer.wordless:
         found = check(certificate, Path(problem), trajectory)
         answer.tell_facts(accepted=found.accepted, **found._asdict())
-        raise typer.Exit(PASSED if found.accepted else NOT_PASSED)
+        options.end(passed=found.accepted)
     with shown(lines=False):
         step("recomputing every claim")
         status = main([str(certificate), problem, str(trajectory)])
@@ -62,20 +53,21 @@ def check_certificate(
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm simulate paper/obs3 --trajectory out/obs3/trajectory.csv --out out/loop"
     )
 )
-@grouped
+@options.grouped
 def simulate(
-    problem: ProblemArgument,
-    trajectory: Trajectory,
-    out: OutFolder,
+    problem: options.ProblemArgument,
+    trajectory: options.Trajectory,
+    out: options.OutFolder,
     settings: Annotated[
-        Path | None, option("FILE", "Masses, cables, motors, gains and kicks (YAML).")
+        Path | None,
+        options.option("FILE", "Masses, cables, motors, gains and kicks (YAML)."),
     ] = None,
     *,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Run a plan in closed loop.
 
@@ -99,25 +91,27 @@ def simulate(
     if not answer.wordless:
         show_simulation(file, out)
     passed = file.executed.verdict == "certified"
-    raise typer.Exit(PASSED if passed else NOT_PASSED)
+    options.end(passed=passed)
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm explain paper/obs1 --out out/explain",
         "vdsm explain paper/obs3 --waypoint 300 --out out/explain",
     )
 )
-@grouped
+@options.grouped
 def explain(
-    problem: ProblemArgument,
-    out: OutFolder,
+    problem: options.ProblemArgument,
+    out: options.OutFolder,
     waypoint: Annotated[
         int | None,
-        option("NUMBER", "From 0; the one with the largest link angle if none.", min=0),
+        options.option(
+            "NUMBER", "From 0; the one with the largest link angle if none.", min=0
+        ),
     ] = None,
     *,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Follow the paper's seven steps at one waypoint.
 
@@ -141,33 +135,33 @@ class Format(StrEnum):
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
         "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --also mcap "
         "--out out/ros",
         "vdsm convert mine.yaml --cables cables.csv --out out/mine",
     )
 )
-@grouped
+@options.grouped
 def convert(
-    problem: ProblemArgument,
-    out: OutFolder,
+    problem: options.ProblemArgument,
+    out: options.OutFolder,
     trajectory: Annotated[
-        Path | None, option("FILE", "Joint angles, CSV, YAML, JSON or bag.")
+        Path | None, options.option("FILE", "Joint angles, CSV, YAML, JSON or bag.")
     ] = None,
     centres: Annotated[
-        Path | None, option("FILE", "Joint centres, as centres.csv.")
+        Path | None, options.option("FILE", "Joint centres, as centres.csv.")
     ] = None,
     cables: Annotated[
-        Path | None, option("FILE", "Cable lengths, as cables.csv.")
+        Path | None, options.option("FILE", "Cable lengths, as cables.csv.")
     ] = None,
     also: Annotated[
         list[Format] | None,
-        option(None, "Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
+        options.option(None, "Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
     ] = None,
     topic: Topic = None,
     *,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Convert angles, centres and cable lengths.
 
@@ -191,8 +185,8 @@ def convert(
     answer.tell("\n".join(lines), waypoints=count, folder=out, notes=notes)
 
 
-@commands.command(epilog=examples("vdsm diff out/monday out/tuesday"))
-@grouped
+@commands.command(epilog=options.examples("vdsm diff out/monday out/tuesday"))
+@options.grouped
 def diff(
     old: Annotated[
         Path,
@@ -200,7 +194,7 @@ def diff(
     ],
     new: Annotated[Path, typer.Argument(metavar="NEW", help="A newer one.")],
     *,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Compare two result folders.
 
@@ -212,4 +206,4 @@ def diff(
     worse = any(one.worse for one in changes)
     told = [asdict(one) for one in changes]
     answer.tell("\n".join(diff_lines(changes)), worse=worse, changes=told)
-    raise typer.Exit(NOT_PASSED if worse else PASSED)
+    options.end(passed=not worse)

@@ -5,78 +5,64 @@ from typing import Annotated, Literal
 
 import typer
 
+from vdsm_pin.cli import options
 from vdsm_pin.cli.ending import INTERRUPTED, fail
-from vdsm_pin.cli.options import (
-    NOT_PASSED,
-    PASSED,
-    Answer,
-    ErrorOptions,
-    OutFolder,
-    PlanningTime,
-    SlideErrors,
-    Strategy,
-    examples,
-    family,
-    grouped,
-    option,
-    problem_argument,
-)
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import COLD_PLAN_LIMIT
 
-commands = family()
+commands = options.family()
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm batch --out out/demo",
         "vdsm batch problems/*.yaml --out out/night --jobs 8 --time-limit 60 --resume",
         "vdsm batch cell.yaml --trajectories plans --out out/plans",
     )
 )
-@grouped
+@options.grouped
 def batch(
-    out: OutFolder = Path("out"),
+    out: options.OutFolder = Path("out"),
     *,
     problems: Annotated[
         list[str] | None,
-        problem_argument(
+        options.problem_argument(
             "Built-in names, problem files or folders of them; the built-in problems "
             "if there is none."
         ),
     ] = None,
-    strategy: Strategy = DEFAULT_STRATEGY,
+    strategy: options.Strategy = DEFAULT_STRATEGY,
     trajectories: Annotated[
         list[str] | None,
-        option(
+        options.option(
             "FILE",
             "Given motions, or folders of them: each is verified for each "
             "problem, nothing is planned; robots of a URDF need it.",
         ),
     ] = None,
-    jobs: Annotated[int, option("NUMBER", "Processes.", min=1)] = 1,
+    jobs: Annotated[int, options.option("NUMBER", "Processes.", min=1)] = 1,
     resume: Annotated[
         bool,
         typer.Option("--resume", help="Skip problems that are finished and intact."),
     ] = False,
-    time_limit: PlanningTime = None,
+    time_limit: options.PlanningTime = None,
     scheduler: Annotated[
         str | None,
-        option("ADDRESS", "A Dask scheduler, as tcp://host:8786; no --jobs."),
+        options.option("ADDRESS", "A Dask scheduler, as tcp://host:8786; no --jobs."),
     ] = None,
     keep: Annotated[
         Literal["all", "failed", "none"],
-        option(None, "Whose files stay; every problem keeps its row."),
+        options.option(None, "Whose files stay; every problem keeps its row."),
     ] = "all",
-    errors: ErrorOptions,
-    slide_error_mm: SlideErrors = "0",
+    errors: options.ErrorOptions,
+    slide_error_mm: options.SlideErrors = "0",
     certificate: Annotated[
         bool, typer.Option("--certificate", help="Write a proof of each to its folder.")
     ] = False,
     pdf: Annotated[
         bool, typer.Option("--pdf", help="Print each report to its folder too.")
     ] = False,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Plan and verify many problems.
 
@@ -127,4 +113,4 @@ def batch(
         typer.echo(json.dumps([row.model_dump() for row in rows], indent=2))
     elif not answer.quiet:
         typer.echo(f"{passed} of {len(rows)} certified; see {out / 'index.html'}")
-    raise typer.Exit(PASSED if passed == len(rows) else NOT_PASSED)
+    options.end(passed=passed == len(rows))

@@ -8,7 +8,7 @@ from functools import wraps
 from inspect import Parameter, Signature, signature
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, NoReturn
 
 import typer
 from typer.core import TyperCommand
@@ -118,6 +118,11 @@ class Answer(NamedTuple):
         """Say it as facts for other programs, if they are wanted."""
         if self.as_json:
             typer.echo(json.dumps(facts, indent=2, default=str))
+
+
+def end(*, passed: bool) -> NoReturn:
+    """End the command, by whether all is as it was asked."""
+    raise typer.Exit(PASSED if passed else NOT_PASSED)
 
 
 class _Command(TyperCommand):

@@ -6,42 +6,30 @@ from contextlib import contextmanager, nullcontext
 
 import typer
 
-from vdsm_pin.cli.options import (
-    NOT_PASSED,
-    PASSED,
-    Answer,
-    ErrorOptions,
-    OutFolder,
-    PlanningTime,
-    ProblemArgument,
-    Strategy,
-    examples,
-    family,
-    grouped,
-)
+from vdsm_pin.cli import options
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import Deadline, enforced
 
-commands = family()
+commands = options.family()
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm plan paper/obs1 --out out/obs1",
         "vdsm plan paper/obs1 --joint-error-deg 0.1 --out out/sturdy",
     )
 )
-@grouped
+@options.grouped
 def plan(
     context: typer.Context,
-    problem: ProblemArgument,
-    out: OutFolder,
+    problem: options.ProblemArgument,
+    out: options.OutFolder,
     *,
-    strategy: Strategy = DEFAULT_STRATEGY,
-    errors: ErrorOptions,
-    time_limit: PlanningTime = None,
-    answer: Answer,
+    strategy: options.Strategy = DEFAULT_STRATEGY,
+    errors: options.ErrorOptions,
+    time_limit: options.PlanningTime = None,
+    answer: options.Answer,
 ) -> None:
     """Plan a motion.
 
@@ -70,7 +58,7 @@ def plan(
         typer.echo(file.text(), nl=False)
     elif not answer.quiet:
         show_plan(file, out)
-    raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
+    options.end(passed=outcome(file.verdict).passed)
 
 
 @contextmanager

@@ -7,41 +7,35 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import (
-    NOT_PASSED,
-    PASSED,
-    Answer,
-    examples,
-    family,
-    from_words,
-    grouped,
-    option,
-    problems_from,
-)
+from vdsm_pin.cli import options
 from vdsm_pin.text import printable
 
-commands = family()
+commands = options.family()
 
 
 def _kinds_from(incomplete: str) -> list[str]:
     from vdsm_pin.app.new_project import KINDS
 
-    return from_words(KINDS)(incomplete)
+    return options.from_words(KINDS)(incomplete)
 
 
 def _schemas_from(incomplete: str) -> list[str]:
     from vdsm_pin.report.files import SCHEMA_NAMES
 
-    return from_words(SCHEMA_NAMES)(incomplete)
+    return options.from_words(SCHEMA_NAMES)(incomplete)
 
 
 @commands.command(
-    epilog=examples("vdsm problems", "vdsm problems --show paper/obs1 > mine.yaml")
+    epilog=options.examples(
+        "vdsm problems", "vdsm problems --show paper/obs1 > mine.yaml"
+    )
 )
 def problems(
     show: Annotated[
         str | None,
-        option("NAME", "Print this problem's file.", autocompletion=problems_from),
+        options.option(
+            "NAME", "Print this problem's file.", autocompletion=options.problems_from
+        ),
     ] = None,
 ) -> None:
     """List the built-in problems, or print one."""
@@ -51,8 +45,10 @@ def problems(
     typer.echo(names if show is None else built_in_text(show), nl=False)
 
 
-@commands.command(epilog=examples("vdsm new mine", "vdsm new cell --from robot"))
-@grouped
+@commands.command(
+    epilog=options.examples("vdsm new mine", "vdsm new cell --from robot")
+)
+@options.grouped
 def new(
     folder: Annotated[
         Path, typer.Argument(metavar="NAME", help="Folder to make; names the problem.")
@@ -67,7 +63,7 @@ def new(
         ),
     ] = "snake",
     *,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Make a folder with a problem to start from."""
     from vdsm_pin.app.new_project import new_project
@@ -81,9 +77,9 @@ def new(
     answer.tell(text, folder=folder, files=files, next=then)
 
 
-@commands.command(epilog=examples("vdsm doctor"))
-@grouped
-def doctor(*, answer: Answer) -> None:
+@commands.command(epilog=options.examples("vdsm doctor"))
+@options.grouped
+def doctor(*, answer: options.Answer) -> None:
     """Say what this installation can do and lacks.
 
     A line for each part, with the way to get what is missing.
@@ -99,10 +95,10 @@ def doctor(*, answer: Answer) -> None:
         lines.append(printable(f"{sign} {one.what:<14} {one.found}{remedy}"))
     answer.tell("\n".join(lines), findings=[asdict(one) for one in findings])
     lacking = any(one.needed and not one.works for one in findings)
-    raise typer.Exit(NOT_PASSED if lacking else PASSED)
+    options.end(passed=not lacking)
 
 
-@commands.command(epilog=examples("vdsm schema verification"))
+@commands.command(epilog=options.examples("vdsm schema verification"))
 def schema(
     name: Annotated[
         str,
@@ -123,11 +119,11 @@ def schema(
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm urdf hrm8 --out hrm8.urdf", "vdsm urdf mine.yaml --out a.urdf"
     )
 )
-@grouped
+@options.grouped
 def urdf(
     name: Annotated[
         str,
@@ -135,7 +131,7 @@ def urdf(
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The URDF.")],
     *,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Write the URDF of an arm."""
     from vdsm_pin.app.problems import read_problem

@@ -6,20 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from vdsm_pin.cli.options import (
-    NOT_PASSED,
-    PASSED,
-    Answer,
-    ErrorOptions,
-    OutFolder,
-    SlideErrors,
-    TimeLimit,
-    Trajectory,
-    examples,
-    family,
-    grouped,
-    option,
-)
+from vdsm_pin.cli import options
 from vdsm_pin.cli.robot import ProblemOrNone, RobotOptions, Topic, refuse_beside
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.time_limit import Deadline, enforced
@@ -30,13 +17,13 @@ if TYPE_CHECKING:
     from vdsm_pin.problem.planning_problem import PlanningProblem
     from vdsm_pin.robots.cell import Cell
 
-commands = family()
+commands = options.family()
 
 Interpolation = Literal["auto", "linear", "cubic", "quintic"]
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1",
         "vdsm verify mine.yaml --trajectory mine.csv --out out/mine "
         "--certificate mine.certificate",
@@ -44,23 +31,25 @@ Interpolation = Literal["auto", "linear", "cubic", "quintic"]
         "--trajectory plan.csv --required-clearance-mm 5 --out out/ur5",
     )
 )
-@grouped
+@options.grouped
 def verify(
     context: typer.Context,
-    trajectory: Trajectory,
-    out: OutFolder,
+    trajectory: options.Trajectory,
+    out: options.OutFolder,
     *,
     problem: ProblemOrNone = None,
-    errors: ErrorOptions,
-    slide_error_mm: SlideErrors = "0",
+    errors: options.ErrorOptions,
+    slide_error_mm: options.SlideErrors = "0",
     certificate: Annotated[
-        Path | None, option("FILE", "Write the proof to this file.")
+        Path | None, options.option("FILE", "Write the proof to this file.")
     ] = None,
     pdf: Annotated[
         Path | None,
-        option("FILE", "Print the report to this file; needs Chromium or Chrome."),
+        options.option(
+            "FILE", "Print the report to this file; needs Chromium or Chrome."
+        ),
     ] = None,
-    time_limit: TimeLimit = None,
+    time_limit: options.TimeLimit = None,
     all_pairs: Annotated[
         bool,
         typer.Option(
@@ -69,13 +58,13 @@ def verify(
     ] = False,
     interpolation: Annotated[
         Interpolation,
-        option(
+        options.option(
             None,
             "What joins waypoints: straight lines, or smooth pieces by the "
             "velocities (cubic) and accelerations (quintic) of the trajectory.",
         ),
     ] = "auto",
-    answer: Answer,
+    answer: options.Answer,
     robot: RobotOptions,
     topic: Topic = None,
 ) -> None:
@@ -114,7 +103,7 @@ def verify(
             all_pairs=all_pairs,
             date=now(),
         )
-    raise typer.Exit(PASSED if _verify_and_tell(order, answer) else NOT_PASSED)
+    options.end(passed=_verify_and_tell(order, answer))
 
 
 def asked_problem(
@@ -147,7 +136,7 @@ def asked_problem(
     return asked.under(errors)
 
 
-def _verify_and_tell(order: "VerifyOrder", answer: Answer) -> bool:
+def _verify_and_tell(order: "VerifyOrder", answer: options.Answer) -> bool:
     """Verify a motion, say what was found, and return whether it is as asked."""
     from vdsm_pin.app.workflow import verify_to_folder
     from vdsm_pin.progress import shown
@@ -177,29 +166,29 @@ def _verify_and_tell(order: "VerifyOrder", answer: Answer) -> bool:
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm repair paper/obs1 --trajectory mine.csv --out out/mine",
         "vdsm repair cell.yaml --trajectory plan.csv --out out/cell",
         "vdsm repair --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
         "--trajectory plan.csv --out out/ur5",
     )
 )
-@grouped
+@options.grouped
 def repair(
     context: typer.Context,
-    trajectory: Trajectory,
-    out: OutFolder,
+    trajectory: options.Trajectory,
+    out: options.OutFolder,
     *,
     problem: ProblemOrNone = None,
-    errors: ErrorOptions,
-    slide_error_mm: SlideErrors = "0",
+    errors: options.ErrorOptions,
+    slide_error_mm: options.SlideErrors = "0",
     robot: RobotOptions,
     topic: Topic = None,
     pin: Annotated[
-        list[int] | None, option("ROW", "A waypoint, from 0, that stays.")
+        list[int] | None, options.option("ROW", "A waypoint, from 0, that stays.")
     ] = None,
-    time_limit: TimeLimit = None,
-    answer: Answer,
+    time_limit: options.TimeLimit = None,
+    answer: options.Answer,
 ) -> None:
     """Mend a trajectory until it is certified.
 

@@ -5,18 +5,10 @@ from typing import Annotated, Final
 
 import typer
 
-from vdsm_pin.cli.options import (
-    Answer,
-    ProblemArgument,
-    ShownMotion,
-    examples,
-    family,
-    grouped,
-    option,
-)
+from vdsm_pin.cli import options
 from vdsm_pin.cli.robot import refuse_beside
 
-commands = family()
+commands = options.family()
 
 PORT: Final = 7000
 """Where a page is served."""
@@ -26,19 +18,20 @@ WIDTH, HEIGHT, OVERVIEW = 1280, 720, "overview"
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm view paper/obs1 --trajectory out/obs1/trajectory.csv",
         "vdsm view paper/obs1 --html obs1.html",
     )
 )
 def view(
-    problem: ProblemArgument,
-    trajectory: ShownMotion = None,
+    problem: options.ProblemArgument,
+    trajectory: options.ShownMotion = None,
     html: Annotated[
-        Path | None, option("FILE", "Write the page to this file; serve nothing.")
+        Path | None,
+        options.option("FILE", "Write the page to this file; serve nothing."),
     ] = None,
     port: Annotated[
-        int, option("NUMBER", "Port to serve on; 0 for any.", min=0, max=65535)
+        int, options.option("NUMBER", "Port to serve on; 0 for any.", min=0, max=65535)
     ] = PORT,
     watch: Annotated[
         bool, typer.Option("--watch", help="Reload the page when a file changes.")
@@ -59,27 +52,29 @@ def view(
 
 
 @commands.command(
-    epilog=examples(
+    epilog=options.examples(
         "vdsm export paper/obs1 --trajectory out/obs1/trajectory.csv --out obs1.glb",
         "vdsm export mine.yaml --trajectory mine.csv --out mine.png --moment 120",
         "vdsm export mine.yaml --trajectory mine.csv --out mine.mp4 --look tip",
     )
 )
-@grouped
+@options.grouped
 def export(
-    problem: ProblemArgument,
+    problem: options.ProblemArgument,
     out: Annotated[
         Path,
-        option("FILE", ".glb (glTF), .png or .mp4 (needs ffmpeg)."),
+        options.option("FILE", ".glb (glTF), .png or .mp4 (needs ffmpeg)."),
     ],
-    trajectory: ShownMotion = None,
+    trajectory: options.ShownMotion = None,
     moment: Annotated[
         float | None,
-        option("WAYPOINT", "Of a .png; 12.5 is between two; 0 by default.", min=0.0),
+        options.option(
+            "WAYPOINT", "Of a .png; 12.5 is between two; 0 by default.", min=0.0
+        ),
     ] = None,
     seconds: Annotated[
         float | None,
-        option(
+        options.option(
             "SECONDS",
             "How long it plays; as the trajectory's times say, or 10.",
             min=0.1,
@@ -88,19 +83,21 @@ def export(
     ] = None,
     look: Annotated[
         str,
-        option("VIEW", "overview, side, top, front, tip, or a direction: 1,-1,0.5."),
+        options.option(
+            "VIEW", "overview, side, top, front, tip, or a direction: 1,-1,0.5."
+        ),
     ] = OVERVIEW,
     width: Annotated[
-        int, option("PIXELS", "Of the picture.", min=64, max=4096)
+        int, options.option("PIXELS", "Of the picture.", min=64, max=4096)
     ] = WIDTH,
     height: Annotated[
-        int, option("PIXELS", "Of the picture.", min=64, max=4096)
+        int, options.option("PIXELS", "Of the picture.", min=64, max=4096)
     ] = HEIGHT,
     numbers: Annotated[
         bool, typer.Option("--numbers", help="Number the links.")
     ] = False,
     *,
-    answer: Answer,
+    answer: options.Answer,
 ) -> None:
     """Write a motion as glTF, as a picture or as a film.
 
