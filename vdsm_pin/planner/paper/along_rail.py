@@ -62,7 +62,10 @@ class AlongRail:
 
     def route(self, missing: float) -> Route:
         """Step 4."""
-        return detour_route(self.problem.path, self.region, self.bends, missing)
+        length = self.problem.manipulator.total_length
+        return detour_route(
+            self.problem.path, self.region, self.bends, length, missing
+        )
 
     def clearance(self, centres: FloatArray) -> float:
         """From the section, taken as endless along the rail, less the margins."""

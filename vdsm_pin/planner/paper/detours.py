@@ -34,9 +34,9 @@ from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 
-WIDER: Final = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
+WIDER: Final = (0.0, 0.01, 0.02, 0.032, 0.048, 0.064, 0.096)
 """By how much wider than the region ways round it are tried, too, where the arm cannot
-follow the taut one; [m]."""
+follow the taut one, over its length; [-]."""
 
 Judge: TypeAlias = Callable[[FloatArray, int], FloatArray]
 """(tip positions (n, 3), side) to the largest link angle with the arm on that side,
@@ -66,7 +66,11 @@ def path_rows(path: DesiredPath, start: float, region: DangerRegion) -> Rows:
 
 
 def detour_route(
-    path: DesiredPath, region: DangerRegion, judge: Judge, missing: float = np.inf
+    path: DesiredPath,
+    region: DangerRegion,
+    judge: Judge,
+    arm_length: float,
+    missing: float = np.inf,
 ) -> Route:
     """The tip's whole route round one region: onto the path, along it, and back.
 
@@ -74,6 +78,7 @@ def detour_route(
         path: The desired path.
         region: The danger region of the tip.
         judge: Which tip positions the arm can take on a side.
+        arm_length: Of the whole arm; [m].
         missing: Less than this of the path must be left undrawn; [m].
 
     Returns:
@@ -95,7 +100,7 @@ def detour_route(
         reason = f"{in_mm(undrawn)} of the path cannot be drawn"
         raise PathBlocked(obstacle=region.name, reason=reason)
     start = _End(path.start, 0, path.start[None, 1:])
-    walk = _Walk(path, region, judge, _largest_angle(pieces, judge))
+    walk = _Walk(path, region, judge, _largest_angle(pieces, judge), arm_length)
     ways: list[Rows] = []
     here = start
     for piece in pieces:
@@ -218,12 +223,14 @@ class _Walk:
         region: What is gone round.
         judge: Which tip positions the arm can take on a side.
         gentle: Largest link angle on the path, which ways should not exceed; [rad].
+        arm_length: Of the whole arm; [m].
     """
 
     path: DesiredPath
     region: DangerRegion
     judge: Judge
     gentle: float
+    arm_length: float
 
 
 def _connect(walk: _Walk, begin: _End, end: _End, station: float) -> Rows:
@@ -233,13 +240,13 @@ def _connect(walk: _Walk, begin: _End, end: _End, station: float) -> Rows:
     it first goes back along the path it can draw, out of the shadow. A way that needs
     no larger link angles than the path itself is preferred.
     """
-    region, shortest = walk.region, None
+    shortest = None
     lines = []
     for k, m in product(*map(_retreats, (begin, end))):
         out, back = begin.retreat[:k], end.retreat[:m][::-1]
         lines += [
             np.concatenate([out, line, back])
-            for line in _ways_round(region, out[-1], back[0])
+            for line in _ways_round(walk, out[-1], back[0])
         ]
     lines.sort(key=lambda line: np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
     from_x, to_x = float(begin.point[0]), float(end.point[0])
@@ -254,7 +261,7 @@ def _connect(walk: _Walk, begin: _End, end: _End, station: float) -> Rows:
         shortest = shortest or way
     if shortest is None:
         reason = "the tip cannot get round it with the arm on the side it needs"
-        raise PathBlocked(obstacle=region.name, reason=reason)
+        raise PathBlocked(obstacle=walk.region.name, reason=reason)
     return shortest
 
 
@@ -264,16 +271,15 @@ def _retreats(end: _End) -> list[int]:
     return [*(2**k for k in range(most.bit_length()) if 2**k < most), most]
 
 
-def _ways_round(
-    region: DangerRegion, begin: FloatArray, end: FloatArray
-) -> list[FloatArray]:
+def _ways_round(walk: _Walk, begin: FloatArray, end: FloatArray) -> list[FloatArray]:
     """The straight line where it is clear, and ways round, taut or wider."""
+    region = walk.region
     straight = np.stack([begin, end])
     touch = region.radius - TOLERANCES.on_boundary
     ways = [straight] if region.core_distance(straight[None])[0] >= touch else []
     ends = region.core_distance(np.stack([straight[[0, 0]], straight[[1, 1]]]))
     for wider in WIDER:
-        grown = region.grown(wider)
+        grown = region.grown(wider * walk.arm_length)
         if wider == 0.0 or ends.min() >= grown.radius:
             ways += [grown.walk(begin, end, sense) for sense in (1, -1)]
     return ways

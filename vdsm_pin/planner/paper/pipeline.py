@@ -39,9 +39,9 @@ from vdsm_pin.units import in_mm
 SUBDIVISIONS: Final = 6
 """Rounds of inserting waypoints; a motion still too fast after them has a jump."""
 
-GRAZE: Final = 1e-3
-"""A motion that misses the clearance by less is planned once more with this much on
-top; [m]."""
+GRAZE: Final = 0.016
+"""A motion that misses the clearance by less than this part of the body's radius is
+planned once more with as much on top; [-]."""
 
 
 def plan_paper(
@@ -139,8 +139,9 @@ def _best_motion(
         best, missing = motion, motion.route.missing
         if missing == 0.0:
             break
-    if best is None and reserve == 0.0 and grazing <= GRAZE:
-        return _best_motion(asked, clearance, GRAZE)
+    graze = GRAZE * problem.manipulator.most_radius
+    if best is None and reserve == 0.0 and grazing <= graze:
+        return _best_motion(asked, clearance, graze)
     if best is None:
         raise reason or NoPlanFound("the paper's rule offers no way round")
     _refuse_gaps(problem, best)
