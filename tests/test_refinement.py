@@ -45,7 +45,8 @@ def test_missing_clearance_between_waypoints_is_added_to_the_margin(
     def close(
         problem: PlanningProblem, clearance: LinkClearance, margin: Margin, *_: Any
     ) -> Plan:
-        return plan_paper(problem, clearance, margin - TOLERANCES.planned_reserve)
+        reserve = TOLERANCES.planned_reserve * problem.manipulator.total_length
+        return plan_paper(problem, clearance, margin - reserve)
 
     monkeypatch.setattr(refinement, "strategy", lambda name: close)
     problem = short("obs3")

@@ -214,19 +214,22 @@ class Tolerances:
     5 deg is asked for; the reserve covers the rounding of a CSV many times over.
     """
 
-    planned_stray: float = _held(1e-5, "m")
-    """How far from its path a planner lets the tip stray between two waypoints; [m].
+    planned_stray: float = _held(3.2e-6, "-")
+    """How far from its path a planner lets the tip stray between two waypoints, over
+    the arm's length; [-].
 
-    The arm draws straight lines in joint space, not in space. On a path 10 mm a row
-    the straight arm strays by 7e-6 m; ten times less would take three times the rows.
+    The arm draws straight lines in joint space, not in space. hrm8 may stray by 10 um:
+    on a path 10 mm a row it does by 7 um when straight; ten times less would take three
+    times the rows.
     """
 
-    planned_reserve: float = _held(1e-4, "m")
-    """What the paper's planner keeps beyond that for the way between waypoints; [m].
+    planned_reserve: float = _held(3.2e-5, "-")
+    """What the paper's planner keeps beyond that for the way between waypoints, over
+    the arm's length; [-].
 
-    A joint that slides 10 mm a row on a region of radius 125 mm cuts 0.1 mm off it;
-    where that is not enough the refinement adds to it. It also makes proofs cheap: they
-    cut time finely where the clearance just suffices.
+    Of hrm8 that is 0.1 mm: a joint that slides 10 mm a row on a region of radius 125 mm
+    cuts as much off it; where that is not enough the refinement adds to it. It also
+    makes proofs cheap: they cut time finely where the clearance just suffices.
     """
 
     whole_parts: float = _held(1e-9, "-")

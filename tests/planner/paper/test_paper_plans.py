@@ -92,7 +92,7 @@ def check_between_waypoints(plan: Plan) -> None:
     # The rule may jump by less than a row may turn: rows in vain, for the tip's sake.
     moved = np.linalg.norm(tip[drawn + 1] - tip[drawn], axis=1)
     jump = (moved > 0.0) & (moved < 1e-2 * path.spacing)
-    most = np.where(jump, path.spacing, TOLERANCES.planned_stray)
+    most = np.where(jump, path.spacing, TOLERANCES.planned_stray * arm.total_length)
     for part in (0.25, 0.5, 0.75):
         between = joints[drawn] + part * (joints[drawn + 1] - joints[drawn])
         reached = joint_centres(arm, between[:, 0], between[:, 1::2], between[:, 2::2])

@@ -298,7 +298,8 @@ def _excess(
     # Straying falls with the square of the distance of the rows.
     bow = np.sqrt(strays.max(axis=1) / stray)
     proved = bound / (STRAYS * spacing)
-    tip = np.sqrt(np.maximum(strays[:, -1] / TOLERANCES.planned_stray, proved))
+    most_stray = TOLERANCES.planned_stray * manipulator.total_length
+    tip = np.sqrt(np.maximum(strays[:, -1] / most_stray, proved))
     bow = np.where(corners.drawn[rows.interval[:-1]], np.maximum(bow, tip), bow)
     return np.asarray(np.maximum(step / turn, bow))
 

@@ -63,9 +63,7 @@ class AlongRail:
     def route(self, missing: float) -> Route:
         """Step 4."""
         length = self.problem.manipulator.total_length
-        return detour_route(
-            self.problem.path, self.region, self.bends, length, missing
-        )
+        return detour_route(self.problem.path, self.region, self.bends, length, missing)
 
     def clearance(self, centres: FloatArray) -> float:
         """From the section, taken as endless along the rail, less the margins."""

@@ -180,6 +180,7 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Pap
     They are also where the tip would stray from its path between two rows.
     """
     manipulator = problem.manipulator
+    stray = TOLERANCES.planned_stray * manipulator.total_length
     for _ in range(SUBDIVISIONS):
         points = route.tip_path.points
         reference = references(problem, route.tip_path)  # Steps 2 and 3
@@ -191,7 +192,7 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Pap
         turns = steps / problem.planned_row_change
         # Halving an interval leaves a quarter of the way by which the tip strays. A
         # jump is not filled with rows for the tip's sake.
-        bows = np.sqrt(np.where(drawn, strays, 0.0) / TOLERANCES.planned_stray)
+        bows = np.sqrt(np.where(drawn, strays, 0.0) / stray)
         needed = bows if (turns <= 1.0).all() else turns
         motion = PaperSteps(avoidance, route, reference, planar, centres, trajectory)
         if (needed <= 1.0).all():

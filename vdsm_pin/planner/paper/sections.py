@@ -92,8 +92,8 @@ def grown_by(problem: PlanningProblem) -> float:
 
 def planned_gap(problem: PlanningProblem) -> float:
     """Clearance aimed at: the required one and the reserves, no margin; [m]."""
-    reserves = TOLERANCES.planned_clearance + TOLERANCES.planned_reserve
-    return problem.required_clearance + reserves
+    between = TOLERANCES.planned_reserve * problem.manipulator.total_length
+    return problem.required_clearance + TOLERANCES.planned_clearance + between
 
 
 def _parallel(direction: FloatArray, unit: FloatArray) -> bool:
