@@ -12,8 +12,8 @@ import pytest
 from vdsm_pin.errors import CannotWrite, InvalidFile
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.report.folder import (
-    check_output_file,
     check_output_folder,
+    check_outputs,
     locked,
     staged,
 )
@@ -164,6 +164,6 @@ def test_bad_places_are_refused_before_any_work(tmp_path: Path) -> None:
     with pytest.raises(InvalidFile, match="expected a folder"):
         check_output_folder(file / "below")
     with pytest.raises(InvalidFile, match="expected a file"):
-        check_output_file(tmp_path)
+        check_outputs([], files=[(tmp_path, ())])
     check_output_folder(tmp_path / "new" / "deep")
-    check_output_file(tmp_path / "new.html")
+    check_outputs([], files=[(tmp_path / "new.html", ())])

@@ -52,17 +52,6 @@ def check_ending(path: Path, *endings: str) -> None:
         raise InvalidFile(file=path, fault=f"{found}, expected {known}")
 
 
-def check_output_file(path: Path) -> None:
-    """Refuse an output file that cannot be written, before any work is done.
-
-    Raises:
-        InvalidFile: If it is a folder or a special file, or its folder cannot take
-            files.
-    """
-    check_replaceable(path)
-    check_output_folder(path.parent)
-
-
 def check_outputs(
     inputs: Iterable[Path],
     *,
@@ -83,15 +72,15 @@ def check_outputs(
             as it may be.
 
     Raises:
-        InvalidFile: If there is one; see `check_output_folder`, `check_output_file`,
-            `check_kept` and `check_ending`.
+        InvalidFile: If there is one; see `check_output_folder`, `check_kept` and
+            `check_ending`.
     """
     outputs = [file for file, _ in files]
     if folder is not None:
         check_output_folder(folder)
         outputs = [*(folder / name for name in names), *outputs]
     for file, _ in files:
-        check_output_file(file)
+        check_output_folder(file.parent)
     check_kept(outputs, inputs)
     for file, endings in files:
         if endings:
