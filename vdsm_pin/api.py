@@ -301,6 +301,7 @@ def write_certificate(
         >>> result = verify(problem, made.trajectory)
         >>> write_certificate(result, "out/api/free.certificate", "out/api/free.csv")
     """
+    from vdsm_pin.certificate_writer.certificate import write_certificate as write
     from vdsm_pin.certificate_writer.lines import Hashes
     from vdsm_pin.io.source import check_unchanged, readable, sha256_of_file
     from vdsm_pin.report.folder import check_kept
@@ -322,7 +323,7 @@ def write_certificate(
         raise InvalidInput(message)
     check_kept([path_of(path)], [*source.files, file])
     hashes = Hashes(problem=source.sha256, trajectory=digest)
-    subject.certify(path_of(path), result, hashes)
+    write(path_of(path), result, hashes, topic=topic)
 
 
 @overload

@@ -17,6 +17,7 @@ from vdsm_pin import api
 from vdsm_pin.app.motions import MotionOptions
 from vdsm_pin.app.subjects import Subject, read_problem_or_cell, subject_of
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_writer.certificate import write_certificate
 from vdsm_pin.certificate_writer.lines import Hashes
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
@@ -82,7 +83,7 @@ def judged(subject: Subject, file: Path, certificate: Path) -> Verification:
     assert source is not None
     if found.verdict is Verdict.CERTIFIED:
         hashes = Hashes(source.sha256, sha256_of_file(file))
-        subject.certify(certificate, found, hashes)
+        write_certificate(certificate, found, hashes)
         outcome = check_certificate(certificate, source.path, file)
         assert outcome.accepted, outcome.reason
     return found

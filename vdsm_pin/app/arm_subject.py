@@ -29,8 +29,7 @@ from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.task import arm_assembly
 from vdsm_pin.verification.verify import verify
 
-if TYPE_CHECKING:  # few need repair or a certificate
-    from vdsm_pin.certificate_writer.lines import Hashes
+if TYPE_CHECKING:  # few need repair
     from vdsm_pin.repair.rounds import Repaired
 
 LINK_ANGLES: Final = "link_angles.csv"
@@ -98,15 +97,6 @@ class ArmSubject:
     def is_of(self, verification: ArmVerification, motion: Trajectory) -> bool:
         """Whether a verification judged this motion, equal to the last bit."""
         return motion.same_as(verification.trajectory)
-
-    def certify(
-        self, path: Path, verification: ArmVerification, hashes: "Hashes"
-    ) -> None:
-        """Write the certificate of a verification."""
-        # Imported by those who ask for one: its schema takes a while to build.
-        from vdsm_pin.certificate_writer.certificate import write_certificate
-
-        write_certificate(path, verification, hashes, self.options.deadline)
 
     def repair(
         self, motion: Trajectory, pinned: Sequence[int]

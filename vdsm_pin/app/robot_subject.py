@@ -19,8 +19,7 @@ from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.robots.trajectory_csv import csv_text
 from vdsm_pin.robots.trajectory_files import joint_path, moved, read_motion
 
-if TYPE_CHECKING:  # few need repair or a certificate
-    from vdsm_pin.certificate_writer.lines import Hashes
+if TYPE_CHECKING:  # few need repair
     from vdsm_pin.repair.rounds import Repaired
 
 NO_FILE: Final = Path("trajectory")
@@ -84,15 +83,6 @@ class RobotSubject:
     def is_of(self, verification: RobotVerification, motion: JointTrajectory) -> bool:
         """Whether a verification judged this motion, equal to the last bit."""
         return motion.path.same_as(verification.trajectory.path)
-
-    def certify(
-        self, path: Path, verification: RobotVerification, hashes: "Hashes"
-    ) -> None:
-        """Write the certificate of a verification."""
-        from vdsm_pin.certificate_writer.certificate import write_certificate
-
-        more = self.options.deadline, self.options.topic
-        write_certificate(path, verification, hashes, *more)
 
     def repair(
         self, motion: JointTrajectory, pinned: Sequence[int]

@@ -17,7 +17,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.records import Verification
 
 if TYPE_CHECKING:  # whoever verifies an arm needs no robots, and few need repair
-    from vdsm_pin.certificate_writer.lines import Hashes
     from vdsm_pin.repair.rounds import Repaired
     from vdsm_pin.report.drawing import Drawing
     from vdsm_pin.robots.cell import Cell
@@ -83,19 +82,6 @@ class Subject(Protocol):
 
     def is_of(self, verification: Any, motion: Any) -> bool:
         """Whether a verification judged this motion, equal to the last bit."""
-
-    def certify(self, path: Path, verification: Any, hashes: "Hashes") -> None:
-        """Write the certificate of a verification.
-
-        Args:
-            path: The certificate; it appears whole or not at all.
-            verification: Certified.
-            hashes: SHA-256 of the problem and of the trajectory file.
-
-        Raises:
-            OutOfTime: If the deadline passes before it is written.
-            VerificationFailed: If there is no proof to write, or one that is too large.
-        """
 
     def repair(self, motion: Any, pinned: Sequence[int]) -> "Repaired[Any, Any]":
         """Find a certified motion near a given one.

@@ -259,7 +259,7 @@ def verify_into(order: VerifyOrder, given: Given, staging: Path) -> Verified:
     plan = planned_by(order.trajectory)
     write_report(staging / REPORT, verification, file, plan, order.index)
     # Last inside: a certificate that cannot be written leaves no half of a result.
-    missing = _certify(order, subject, verification, record)
+    missing = _certify(order, verification, record)
     return Verified(file, verification, missing)
 
 
@@ -285,19 +285,20 @@ def planned_by(trajectory: Path) -> PlanFile | None:
     return plan if same else None
 
 
-def _certify(
-    order: VerifyOrder, subject: Subject, verification: Verification, record: RunRecord
-) -> str:
+def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) -> str:
     """Write the proof down if it is asked for, or say why not."""
     if order.certificate is None:
         return ""
     if verification.verdict is not Verdict.CERTIFIED:
         return "no proof"
+    # Imported by those who ask for one: its schema takes a while to build.
+    from vdsm_pin.certificate_writer.certificate import write_certificate
     from vdsm_pin.certificate_writer.lines import Hashes
 
     hashes = Hashes(record.problem_sha256, record.trajectory_sha256)
+    how = order.options.deadline, order.options.topic
     try:
-        subject.certify(order.certificate, verification, hashes)
+        write_certificate(order.certificate, verification, hashes, *how)
     except (OutOfTime, VerificationFailed) as error:
         return str(error)
     return ""

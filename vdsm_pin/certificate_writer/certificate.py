@@ -6,7 +6,7 @@ The format is docs/certificate.md.
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -42,15 +42,12 @@ from vdsm_pin.verification.inside import (
     unlocated,
 )
 from vdsm_pin.verification.moving import joined_path
-from vdsm_pin.verification.records import ArmVerification
-
-if TYPE_CHECKING:  # whoever verifies an arm needs no robots
-    from vdsm_pin.robots.judgement import RobotVerification
+from vdsm_pin.verification.records import ArmVerification, Verification
 
 
 def write_certificate(
     path: Path,
-    verification: "ArmVerification | RobotVerification",
+    verification: Verification,
     hashes: Hashes,
     deadline: Deadline = NO_LIMIT,
     topic: str | None = None,
@@ -95,12 +92,14 @@ def _of_arm(
 
 
 def _of_robot(
-    verification: "RobotVerification", hashes: Hashes, budget: Budget, topic: str | None
+    verification: Verification, hashes: Hashes, budget: Budget, topic: str | None
 ) -> tuple[AnyHeader, Recorded]:
     """The same of any other robot's, its long intervals uncut."""
     from vdsm_pin.robots.cell import joint_errors
     from vdsm_pin.robots.files import HULLS
+    from vdsm_pin.robots.judgement import RobotVerification
 
+    assert isinstance(verification, RobotVerification)
     cell, path = verification.problem, verification.trajectory.path
     robot, whole = cell.robot, joined_path(path, cell.scene)
     motion = AskedMotion(cell.asked, *whole, verification.errors)
