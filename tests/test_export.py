@@ -19,7 +19,7 @@ from made_up import trajectory
 from PIL import Image
 from problem_files import NEAR, write_problem
 
-from vdsm_pin.app.export import ExportOrder, export
+from vdsm_pin.app.export import export
 from vdsm_pin.app.new_project import new_project
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.cli import main
@@ -232,15 +232,9 @@ class TestWithABrowser:
         program.chmod(0o755)
         monkeypatch.setenv("FFMPEG", str(program))
         problem = read_problem(write_problem(tmp_path / "near.yaml", NEAR))
-        order = ExportOrder(
-            problem,
-            None,
-            tmp_path / "near.mp4",
-            shot=Shot(width=320, height=180),
-            seconds=1.0,
-        )
-        export(order)
-        written = order.out.read_bytes()
+        film, shot = tmp_path / "near.mp4", Shot(width=320, height=180)
+        export(problem, None, film, seconds=1.0, shot=shot)
+        written = film.read_bytes()
         assert written.count(b"\xff\xd8\xff\xe0") == 2  # it stands still
 
     def test_a_browser_that_draws_nothing_is_told(

@@ -1,6 +1,5 @@
 """A motion as a file for others: glTF, a picture or a film."""
 
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -20,57 +19,48 @@ ENDINGS: Final = (".glb", ".png", ".mp4")
 MOST_SECONDS: Final = 120.0
 """Of a film; [s]."""
 
+PLAIN: Final = Shot()
+"""How to look where nobody says it."""
 
-@dataclass(frozen=True)
-class ExportOrder:
-    """What to export.
+
+def export(
+    problem: ProblemOrCell,
+    trajectory: Path | None,
+    out: Path,
+    moment: float = 0.0,
+    seconds: float | None = None,
+    shot: Shot = PLAIN,
+) -> None:
+    """Write a motion as the file that its ending says.
 
     Args:
         problem: As it was read.
         trajectory: The motion; None for the arm at the start.
-        out: The file; its ending says what it is.
+        out: The file.
         moment: Which moment a picture shows, in waypoints.
         seconds: How long it plays; None: as the trajectory's times say, or 10 s.
         shot: How to look.
-    """
-
-    problem: ProblemOrCell
-    trajectory: Path | None
-    out: Path
-    moment: float = 0.0
-    seconds: float | None = None
-    shot: Shot = field(default_factory=Shot)
-
-
-def export(order: ExportOrder) -> None:
-    """Write the file.
 
     Raises:
         InvalidInput: If it cannot be written, or what draws it is missing.
     """
-    _check(order)
-    shown = drawing(order.problem, order.trajectory)
-    match order.out.suffix.lower():
-        case ".glb":
-            write_bytes(order.out, glb(shown, order.seconds))
-        case ".png":
-            moment = [_within(order.moment, shown)]
-            page = view_page(shown)
-            (one,) = pictures(page, moment, order.shot, "png", order.out)
-            write_bytes(order.out, one)
-        case _:
-            moments, page = _moments(shown, order.seconds), view_page(shown)
-            frames = pictures(page, moments, order.shot, "jpeg", order.out)
-            with atomic_path(order.out) as file:
-                encode(frames, file, order.out)
-
-
-def _check(order: ExportOrder) -> None:
-    """Refuse what cannot be done before any work is."""
-    motion = () if order.trajectory is None else (order.trajectory,)
-    check_outputs((*order.problem.files, *motion), files=[(order.out, ENDINGS)])
-    if order.out.suffix.lower() == ".mp4":
+    motion = () if trajectory is None else (trajectory,)
+    check_outputs((*problem.files, *motion), files=[(out, ENDINGS)])
+    ending = out.suffix.lower()
+    if ending == ".mp4":
         find_encoder()
+    shown = drawing(problem, trajectory)
+    if ending == ".glb":
+        write_bytes(out, glb(shown, seconds))
+    elif ending == ".png":
+        at, page = [_within(moment, shown)], view_page(shown)
+        (one,) = pictures(page, at, shot, "png", out)
+        write_bytes(out, one)
+    else:
+        moments, page = _moments(shown, seconds), view_page(shown)
+        frames = pictures(page, moments, shot, "jpeg", out)
+        with atomic_path(out) as file:
+            encode(frames, file, out)
 
 
 def _within(moment: float, shown: Drawing) -> float:

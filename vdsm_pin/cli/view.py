@@ -103,7 +103,6 @@ def export(
 
     PNG and MP4 are drawn by a Chromium or Chrome of this machine, without a window.
     """
-    from vdsm_pin.app.export import ExportOrder
     from vdsm_pin.app.export import export as write
     from vdsm_pin.app.subjects import read_problem_or_cell
     from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -123,5 +122,5 @@ def export(
     asked = read_problem_or_cell(problem)
     if look == "tip" and not isinstance(asked, PlanningProblem):
         refuse_beside("a robot", {"--look tip": look})
-    write(ExportOrder(asked, trajectory, out, moment or 0.0, seconds, shot))
+    write(asked, trajectory, out, moment or 0.0, seconds, shot)
     answer.tell(f"wrote {out}", file=out)
