@@ -15,7 +15,6 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.simulation.closed_loop import Simulation, simulate
 from vdsm_pin.simulation.folder import (
     SUMMARY,
-    SimulationOrder,
     cleared,
     show_simulation,
     simulate_to_folder,
@@ -149,9 +148,8 @@ def test_settings_that_do_not_fit_the_arm_are_refused_by_their_file(
     problem, rows = read_problem("paper/obs3"), tmp_path / "t.csv"
     vp.write_trajectory(rows, bending(10, angle=0.02))
     settings, file = Settings(kicks=(kick,)), tmp_path / "set.yaml"
-    order = SimulationOrder(problem, rows, tmp_path / "out", settings, file)
     with pytest.raises(InvalidInput, match=r"set\.yaml: kicks\[0\]\.joint is 9"):
-        simulate_to_folder(order)
+        simulate_to_folder(problem, rows, tmp_path / "out", settings, file)
 
 
 def test_a_step_at_which_it_diverges_is_told() -> None:
@@ -177,8 +175,7 @@ def test_a_folder_holds_what_the_verifier_takes(
     problem = read_problem("paper/obs3")
     file = tmp_path / "t.csv"
     vp.write_trajectory(file, bending(10, angle=0.02))
-    order = SimulationOrder(problem, file, tmp_path / "out", Settings())
-    told = simulate_to_folder(order)
+    told = simulate_to_folder(problem, file, tmp_path / "out", Settings())
     executed = vp.read_trajectory(tmp_path / "out" / "executed.csv", problem)
     assert executed.n_links == 8
     assert told.executed.verdict == "certified"
@@ -212,9 +209,8 @@ def test_places_on_a_path_are_not_asked_for_where_there_is_none(
     lines = [line.split(",") for line in file.read_text().splitlines()]
     file.write_text("\n".join(",".join([row[0], *row[3:]]) for row in lines) + "\n")
     assert lines[0][:4] == ["waypoint", "on_path", "path_m", "x0_m"]
-    order = SimulationOrder(with_path, file, tmp_path / "out", Settings())
+    more = file, tmp_path / "out", Settings()
     with pytest.raises(InvalidInput, match="has no column 'on_path'"):
-        simulate_to_folder(order)
-    without = replace(order, problem=replace(with_path, tip_path=None))
+        simulate_to_folder(with_path, *more)
     with pytest.raises(InvalidInput, match="10 rows simulated"):
-        simulate_to_folder(without)
+        simulate_to_folder(replace(with_path, tip_path=None), *more)

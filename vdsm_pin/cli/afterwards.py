@@ -77,7 +77,6 @@ def simulate(
     """
     from vdsm_pin.app.problems import read_problem
     from vdsm_pin.simulation.folder import (
-        SimulationOrder,
         show_simulation,
         simulate_to_folder,
     )
@@ -85,8 +84,7 @@ def simulate(
 
     assumed = Settings() if settings is None else read_settings(settings)
     asked = read_problem(problem)
-    order = SimulationOrder(asked, trajectory, out, assumed, settings)
-    file = simulate_to_folder(order)
+    file = simulate_to_folder(asked, trajectory, out, assumed, settings)
     answer.tell_facts(**file.model_dump(mode="json"))
     if not answer.wordless:
         show_simulation(file, out)

@@ -1,7 +1,7 @@
 """One simulation from files to a result folder."""
 
 import math
-from dataclasses import dataclass
+from contextlib import nullcontext
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final, Literal
@@ -10,8 +10,13 @@ import numpy as np
 import typer
 from pydantic import Field
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.source import check_is_file, check_unchanged, sha256_of_file
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io.source import (
+    check_is_file,
+    check_unchanged,
+    naming_file,
+    sha256_of_file,
+)
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -90,9 +95,14 @@ class SimulationFile(ResultModel):
     versions: dict[str, str] = Field(description="of everything a number depends on")
 
 
-@dataclass(frozen=True)
-class SimulationOrder:
-    """What to simulate and where the results go.
+def simulate_to_folder(
+    problem: PlanningProblem,
+    trajectory: Path,
+    folder: Path,
+    settings: Settings,
+    settings_file: Path | None = None,
+) -> SimulationFile:
+    """Run a plan in closed loop; write executed.csv, simulation.csv, .json and .html.
 
     Args:
         problem: As it was read.
@@ -100,36 +110,14 @@ class SimulationOrder:
         folder: Where the results go.
         settings: What is assumed.
         settings_file: Where that was read; None for the defaults.
-    """
-
-    problem: PlanningProblem
-    trajectory: Path
-    folder: Path
-    settings: Settings
-    settings_file: Path | None = None
-
-
-def _check_settings(order: SimulationOrder) -> None:
-    """Refuse settings that do not fit the arm, by the name of their file."""
-    try:
-        order.settings.check(order.problem.manipulator.n_links)
-    except InvalidInput as error:
-        if order.settings_file is None:
-            raise
-        raise InvalidFile(file=order.settings_file, fault=str(error)) from error
-
-
-def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
-    """Run a plan in closed loop; write executed.csv, simulation.csv, .json and .html.
 
     Raises:
-        InvalidInput: If a file is bad or the folder cannot be written.
-        VerificationFailed: If MuJoCo is missing or the simulation diverges.
+        InvalidInput: If a file is bad or the folder cannot be written, or MuJoCo is
+            missing.
+        VerificationFailed: If the simulation diverges.
     """
-    read = [*order.problem.files, order.trajectory, order.settings_file]
-    names = EXECUTED, RECORD, SUMMARY, PAGE
-    check_outputs(filter(None, read), folder=order.folder, names=names)
-    problem = order.problem
+    read = filter(None, [*problem.files, trajectory, settings_file])
+    check_outputs(read, folder=folder, names=(EXECUTED, RECORD, SUMMARY, PAGE))
     if problem.scene.moving:
         name = problem.scene.moving[0].name
         message = (
@@ -137,19 +125,20 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
             "nothing could be said of its clearance"
         )
         raise InvalidInput(message)
-    _check_settings(order)
-    check_is_file(order.trajectory)
-    digest = sha256_of_file(order.trajectory)
     arm, asked = problem.manipulator, problem.tip_path is not None
-    planned = read_trajectory(order.trajectory, arm, "linear", places=asked)
-    found = simulate(problem.manipulator, planned, order.settings)
-    file = summary(problem, planned, found, order.settings, digest)
-    check_unchanged(order.trajectory, digest)
-    with staged(order.folder) as staging:
+    with nullcontext() if settings_file is None else naming_file(settings_file):
+        settings.check(arm.n_links)
+    check_is_file(trajectory)
+    digest = sha256_of_file(trajectory)
+    planned = read_trajectory(trajectory, arm, "linear", places=asked)
+    found = simulate(arm, planned, settings)
+    file = summary(problem, planned, found, settings, digest)
+    check_unchanged(trajectory, digest)
+    with staged(folder) as staging:
         write_trajectory(staging / EXECUTED, found.trajectory)
         _write_record(staging / RECORD, found)
         (staging / SUMMARY).write_text(file.text(), encoding="utf-8")
-        text = page(file, found, order.settings, problem.required_clearance)
+        text = page(file, found, settings, problem.required_clearance)
         (staging / PAGE).write_text(text, encoding="utf-8")
     return file
 
