@@ -37,18 +37,14 @@ _CONNECT: Final = "20s"
 _ours = threading.local()
 
 
-@dataclass(frozen=True)
-class _Placed:
-    """A task, and the folder that its relative paths start from."""
+def _perform(placed: tuple[Task, Path]) -> Done:
+    """Perform a task whose paths start from a folder, in a warm process.
 
-    task: Task
-    folder: Path
-
-
-def _perform(placed: _Placed) -> Done:
-    """Perform a task in a warm process, which may have done others elsewhere."""
-    os.chdir(placed.folder)
-    return perform(placed.task)
+    The process may have done others elsewhere.
+    """
+    task, folder = placed
+    os.chdir(folder)
+    return perform(task)
 
 
 @dataclass(frozen=True)
@@ -151,12 +147,12 @@ def _run(errand: _Errand) -> list[Ended[Task, Done]]:
         raise InvalidInput(message)
     if not hasattr(_ours, "process"):
         _ours.process = WarmProcess(_perform)
-    process: WarmProcess[_Placed, Done] = _ours.process
+    process: WarmProcess[tuple[Task, Path], Done] = _ours.process
     found = []
     for task in errand.tasks:
-        placed = _Placed(_attempt(task), errand.folder)
-        ended = process.run(placed, task.settings.time_limit)
-        found.append(Ended(placed.task, ended.result, ended.outcome, ended.reason))
+        tried = _attempt(task)
+        ended = process.run((tried, errand.folder), task.settings.time_limit)
+        found.append(Ended(tried, ended.result, ended.outcome, ended.reason))
     return found
 
 
