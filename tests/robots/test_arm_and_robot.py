@@ -112,7 +112,7 @@ def test_closed_form_and_either_judged(seed: int, tmp_path: Path) -> None:
         assert note.startswith("other: is judged by its")
         names = [check.name for check in found.checks]
         assert (f"other: {POSES}" in names) == (name == "arm")
-        assert "other: " in report_data(found).text
+        assert "other: " in report_data(found)["data"]
 
 
 @pytest.mark.parametrize("share", [0.999, 1.001])

@@ -119,7 +119,7 @@ def test_another_robot_may_stand_still(tmp_path: Path) -> None:
     found = verify_robot(cell, read_rows(file, cell.robot))
     least = truth(q, np.linspace(0.0, 3.0, 9_001)).min()
     assert found.approaches[0].lower <= least <= found.approaches[0].upper + 1e-9
-    assert "right: ball" in report_data(found).text
+    assert "right: ball" in report_data(found)["data"]
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,7 @@ def write_report(
         plan: How the trajectory was planned, where that is known.
         index: Where the page of the batch is that it belongs to; empty if to none.
     """
-    data, arm = report_data(verification), None
+    arm = None
     if isinstance(verification, ArmVerification):
         arm = verification.problem.manipulator
     page = rendered(
@@ -146,13 +146,9 @@ def write_report(
         plan=plan,
         problem=verification.problem,
         arm=arm,
-        data=data.text,
         most_drawn=MOST_DRAWN,
-        charts=data.charts,
-        complete=data.complete,
         timed=verification.trajectory.times is not None,
         obstacles=scene_rows(verification.problem),
-        drawn=data.triangles,
         worst=nearest_to_obstacle(verification),
         first_bad=next(
             (words.finite(one.moment) for one in failing(verification)), None
@@ -160,6 +156,7 @@ def write_report(
         left_out=left_out_words(file.left_out),
         held=any(pair.obstacle for pair in verification.pairs),
         index=index,
+        **report_data(verification),
     )
     path.write_text(page, encoding="utf-8")
 

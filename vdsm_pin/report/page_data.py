@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,25 +72,15 @@ def ghost_data(verification: Verification, found: Counterexample) -> dict[str, A
     return {"moment": found.moment, "words": words, **stance}
 
 
-@dataclass(frozen=True)
-class PageData:
-    """What a page is made of.
+def report_data(verification: Verification) -> dict[str, Any]:
+    """What is drawn on a report, by the names that its template has for it.
 
-    Args:
-        text: Everything its scripts read, as JSON that is safe inside HTML.
+    Returns:
+        data: Everything its scripts read, as JSON that is safe inside HTML.
         charts: Identifier, title and note of every plot.
         complete: Whether every row of the motion is shown.
-        triangles: How many are drawn of each obstacle drawn, by its name.
+        drawn: How many triangles are drawn of each obstacle drawn, by its name.
     """
-
-    text: str
-    charts: tuple[dict[str, Any], ...]
-    complete: bool
-    triangles: dict[str, int]
-
-
-def report_data(verification: Verification) -> PageData:
-    """The data of a report."""
     lost = verification.counterexamples
     remarkable = [row.interval for row in verification.approaches]
     remarkable += [one.interval for one in lost]
@@ -108,9 +98,13 @@ def report_data(verification: Verification) -> PageData:
         if np.isfinite(one.moment)
     ]
     near = [closest_data(verification, row) for row in verification.approaches]
-    text = embedded(_page(scene, motion, near) | {"marks": marks, "charts": plots})
-    triangles = {solid["name"]: solid["count"] for solid in scene["obstacles"]}
-    return PageData(text, tuple(plots), shown.complete, triangles)
+    page = _page(scene, motion, near) | {"marks": marks, "charts": plots}
+    return {
+        "data": embedded(page),
+        "charts": plots,
+        "complete": shown.complete,
+        "drawn": {solid["name"]: solid["count"] for solid in scene["obstacles"]},
+    }
 
 
 def view_data(drawing: Drawing) -> str:
