@@ -13,7 +13,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.faces import cut_faces
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
-from vdsm_pin.io.meshes.scene import Part, Placed, composed, strip_triangles
+from vdsm_pin.io.meshes.scene import Placed, composed, strip_triangles
 from vdsm_pin.io.xml_reader import read_xml
 
 MAX_BYTES: Final = 256 << 20
@@ -65,7 +65,7 @@ class _Reader:
         self._by_id = dict[str, list[_Element]]()
         for element in root.iter():
             self._by_id.setdefault(element.get("id", ""), []).append(element)
-        self._parts: dict[_Element, list[Part]] = {}
+        self._parts: dict[_Element, list[RawMesh]] = {}
         self._placed, self._notes = Placed(stream), dict[str, int]()
         self._bend, self._n_nodes = 0.0, 0
 
@@ -133,7 +133,7 @@ class _Reader:
             self._parts[geometry] = self._parts_of(geometry)
         self._placed.put(self._parts[geometry], pose)
 
-    def _parts_of(self, geometry: _Element) -> list[Part]:
+    def _parts_of(self, geometry: _Element) -> list[RawMesh]:
         """The triangles of a geometry, which many nodes may place."""
         parts = []
         for mesh in geometry:
@@ -149,7 +149,7 @@ class _Reader:
                     parts.append(self._part(mesh, faces))
         return parts
 
-    def _part(self, mesh: _Element, faces: _Element) -> Part:
+    def _part(self, mesh: _Element, faces: _Element) -> RawMesh:
         """The triangles of one list of faces."""
         offset, stride, vertices = self._inputs(faces)
         loops = [
@@ -183,7 +183,7 @@ class _Reader:
         self._bend = max(self._bend, cut.bend)
         for note in cut.notes:
             self._notes[note] = self._notes.get(note, 0) + 1
-        return Part(vertices, cut.triangles)
+        return RawMesh(vertices, cut.triangles)
 
     def _inputs(self, faces: _Element) -> tuple[int, int, FloatArray]:
         """Where vertex numbers stand among those of a corner, how many there are."""

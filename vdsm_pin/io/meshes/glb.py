@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_quaternion
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, doubles
-from vdsm_pin.io.meshes.scene import Part, Placed, composed, strip_triangles
+from vdsm_pin.io.meshes.scene import Placed, composed, strip_triangles
 from vdsm_pin.io.schema_types import Number
 
 _LOOKS: Final = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
@@ -163,7 +163,7 @@ class _Reader:
 
     def __init__(self, stream: MeshStream, document: _Document, data: bytes) -> None:
         self._stream, self._document, self._data = stream, document, data
-        self._parts: dict[int, list[Part]] = {}
+        self._parts: dict[int, list[RawMesh]] = {}
         self._placed, self._left_out = Placed(stream), 0
 
     def read(self) -> RawMesh:
@@ -219,7 +219,7 @@ class _Reader:
             self._parts[node.mesh] = [part for part in made if part is not None]
         self._placed.put(self._parts[node.mesh], pose)
 
-    def _part(self, primitive: _Primitive) -> Part | None:
+    def _part(self, primitive: _Primitive) -> RawMesh | None:
         if primitive.mode < _TRIANGLES:
             self._left_out += 1
             return None
@@ -239,7 +239,7 @@ class _Reader:
         if not (order < len(vertices)).all():
             fault = f"names vertex {order.max()} of {len(vertices)}"
             raise self._stream.invalid(fault)
-        return Part(vertices, _triangles(order, primitive.mode))
+        return RawMesh(vertices, _triangles(order, primitive.mode))
 
     def _numbers(self, number: int, shape: str) -> FloatArray:
         """What an accessor gives, shape (count, 3) or (count, 1)."""

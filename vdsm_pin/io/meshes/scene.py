@@ -10,19 +10,6 @@ from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
 from vdsm_pin.io.schema_types import LARGEST
 
 
-@dataclass(frozen=True)
-class Part:
-    """Triangles in a frame of their own.
-
-    Args:
-        vertices: Shape (n, 3).
-        triangles: Vertex indices, shape (m, 3).
-    """
-
-    vertices: FloatArray
-    triangles: IntArray
-
-
 def composed(stream: MeshStream, pose: FloatArray, move: FloatArray) -> FloatArray:
     """One affine map behind another, both of shape (4, 4).
 
@@ -64,13 +51,13 @@ class Placed:
     n_vertices: int = 0
     n_triangles: int = 0
 
-    def put(self, parts: Sequence[Part], pose: FloatArray) -> None:
+    def put(self, parts: Sequence[RawMesh], pose: FloatArray) -> None:
         """Put parts into the frame of the file.
 
         A mirror turns triangles over; they are turned back.
 
         Args:
-            parts: Any number.
+            parts: Any number, as their triangles stand in their own frames.
             pose: T_file_part, shape (4, 4), affine.
 
         Raises:
