@@ -435,7 +435,7 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
             rows,
         ],
         "file: has no ending, expected .pdf": [*verify, rows, "--pdf", file],
-        "trajectory.csv: ends in '.csv', expected .certificate or .jsonl or none": [
+        "trajectory.csv: ends in '.csv', expected .certificate, .jsonl or none": [
             *(*verify, rows, "--certificate", folder / "other" / "trajectory.csv")
         ],
         "notes.md: ends in '.md', expected .urdf or .xml": [

@@ -127,7 +127,7 @@ def test_a_motion_plays_evenly_by_what_moves_most_and_by_its_own_times() -> None
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--out", "a.gif"], "ends in '.gif', expected .glb or .png or .mp4"),
+        (["--out", "a.gif"], "ends in '.gif', expected .glb, .png or .mp4"),
         (["--out", "a.png", "--look", "below"], "expected one of overview"),
         (["--out", "a.png", "--moment", "3"], "a waypoint from 0 to 0"),
         (["--out", "a.mp4"], "an MP4 needs ffmpeg: 'nothing' is not installed"),

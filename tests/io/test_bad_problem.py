@@ -520,7 +520,7 @@ def test_missing_and_damaged_meshes_name_file_and_field(tmp_path: Path) -> None:
     message = refusal(mesh_problem(tmp_path, good[:-1]))
     assert "'part.stl': is damaged: its header promises 4 triangles" in message
     message = refusal(mesh_problem(tmp_path, good, file="."))
-    assert "'.': has the ending '', expected .stl, .obj, " in message
+    assert "'.': has no ending, expected .stl, .obj, " in message
 
 
 @pytest.mark.parametrize(("unit", "size"), [("mm", 500.0), ("m", 0.5)])

@@ -358,7 +358,7 @@ BAD = {
         pcd("ascii", b"", MAX_CORNERS + 1),
         f"has more than {MAX_CORNERS} ver",
     ),
-    "a.las": (b"x", "has the ending '.las', expected .ply, .pcd"),
+    "a.las": (b"x", "ends in '.las', expected .ply, .pcd"),
     "b.xyz": (b"1 2\n", "line 1: found '1 2', expected 3 numbers"),
     "c.xyz": (b"1 2 3\n1 b 3\n", "line 2: found '1 b 3', expected 3 numbers"),
     "d.xyz": (b"1,5 2,5 3,5\n", "has commas inside numbers"),

@@ -251,7 +251,7 @@ DAMAGE = [
         "vertex 2: has a coordinate that is not",
     ),
     ("a.obj", "hello\n", "has no triangle"),
-    ("a.step", "x", "has the ending '.step', expected .stl, .obj, .ply, .glb or .dae"),
+    ("a.step", "x", "ends in '.step', expected .stl, .obj, .ply, .glb or .dae"),
 ]
 
 

@@ -14,9 +14,9 @@ import numpy as np
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.meshes.ply import read_ply_points
-from vdsm_pin.io.meshes.raw import MeshStream, check_ending, doubles
+from vdsm_pin.io.meshes.raw import MeshStream, doubles
 from vdsm_pin.io.pcd import read_pcd
-from vdsm_pin.io.source import Digest, opened
+from vdsm_pin.io.source import Digest, check_ending, opened
 
 MAX_BYTES: Final = 1 << 30
 MAX_POINTS: Final = 5_000_000

@@ -17,10 +17,10 @@ from vdsm_pin.geometry.arrays import FloatArray, first_equal
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.meshes.obj import read_obj
 from vdsm_pin.io.meshes.ply import read_ply
-from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, check_ending
+from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
 from vdsm_pin.io.meshes.stl import read_stl
 from vdsm_pin.io.obstacle_schema import FromFileModel
-from vdsm_pin.io.source import Digest, opened
+from vdsm_pin.io.source import Digest, check_ending, opened
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE

@@ -51,6 +51,20 @@ def path_of(value: Any) -> Path:
         raise InvalidInput(message) from None
 
 
+def check_ending(path: Path, known: Iterable[str]) -> str:
+    """The ending of a file, in small letters.
+
+    Raises:
+        InvalidFile: If it is none of those known, of which "" is to have none.
+    """
+    ending, (*most, last) = path.suffix.lower(), (one or "none" for one in known)
+    if (ending or "none") not in (*most, last):
+        found = f"ends in {path.suffix!r}" if ending else "has no ending"
+        expected = f"{', '.join(most)} or {last}" if most else last
+        raise InvalidFile(file=path, fault=f"{found}, expected {expected}")
+    return ending
+
+
 def check_is_file(path: Path) -> None:
     """Refuse what is not a readable regular file.
 

@@ -11,6 +11,7 @@ from typing import Final
 
 from vdsm_pin.errors import CannotWrite, InvalidFile
 from vdsm_pin.io.atomic import check_replaceable, writing
+from vdsm_pin.io.source import check_ending
 
 UNFINISHED: Final = ".vdsm-unfinished-"
 """What the names of temporary folders begin with."""
@@ -38,18 +39,6 @@ def check_output_folder(folder: Path) -> None:
         raise InvalidFile(file=nearest, fault="is a file, expected a folder")
     if not os.access(nearest, os.W_OK | os.X_OK):
         raise InvalidFile(file=nearest, fault="is not writable")
-
-
-def check_ending(path: Path, *endings: str) -> None:
-    """Refuse a file of another kind, named by mistake: it would be replaced.
-
-    Raises:
-        InvalidFile: If it has none of the endings; "" stands for a name without one.
-    """
-    if path.suffix.lower() not in endings:
-        known = " or ".join(ending or "none" for ending in endings)
-        found = f"ends in {path.suffix!r}" if path.suffix else "has no ending"
-        raise InvalidFile(file=path, fault=f"{found}, expected {known}")
 
 
 def check_outputs(
@@ -84,7 +73,7 @@ def check_outputs(
     check_kept(outputs, inputs)
     for file, endings in files:
         if endings:
-            check_ending(file, *endings)
+            check_ending(file, endings)
 
 
 def check_kept(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:

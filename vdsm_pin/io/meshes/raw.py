@@ -1,7 +1,7 @@
 """What every format is read to, and what the readers of text share."""
 
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -30,19 +30,6 @@ def doubles(values: Any) -> FloatArray:
     """Numbers of any kind as doubles; a NaN that signals is a NaN, without a word."""
     with np.errstate(invalid="ignore"):
         return np.asarray(values, dtype=np.float64)
-
-
-def check_ending(path: Path, known: Iterable[str]) -> str:
-    """The ending of a file, in small letters.
-
-    Raises:
-        InvalidFile: If it is none of those known.
-    """
-    kind, (*most, last) = path.suffix.lower(), known
-    if kind not in (*most, last):
-        fault = f"has the ending {kind!r}, expected {', '.join(most)} or {last}"
-        raise InvalidFile(file=path, fault=fault)
-    return kind
 
 
 @dataclass(frozen=True)
