@@ -15,7 +15,6 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.io.trajectory_messages import ENDINGS
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.impasse import at_start
 from vdsm_pin.report.tables import (
     ClearanceCsv,
@@ -63,10 +62,6 @@ class ArmSubject:
     def at_start(self) -> Trajectory:
         """The motion that stays where the arm begins."""
         return at_start(self.problem)
-
-    def drawing(self, motion: Trajectory) -> ArmDrawing:
-        """How a motion looks."""
-        return ArmDrawing(self.problem, motion)
 
     def checked(self, motion: object) -> Trajectory:
         """The motion itself, if it is a `Trajectory`; `verify` checks that it fits."""

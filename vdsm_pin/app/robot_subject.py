@@ -12,7 +12,6 @@ import numpy as np
 from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions, check_times, expect
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
-from vdsm_pin.report.robot_drawing import RobotDrawing
 from vdsm_pin.report.tables import ClearanceCsv
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
@@ -51,10 +50,6 @@ class RobotSubject:
         joints = self.problem.robot.joints
         q = [min(max(0.0, joint.lower), joint.upper) for joint in joints]
         return JointTrajectory(tuple(joint.name for joint in joints), np.array([q]))
-
-    def drawing(self, motion: JointTrajectory) -> RobotDrawing:
-        """How a motion looks."""
-        return RobotDrawing(self.problem, motion)
 
     def checked(self, motion: object) -> JointTrajectory:
         """The motion with its columns in the robot's order, if it has its joints."""

@@ -18,7 +18,6 @@ from vdsm_pin.verification.records import Verification
 
 if TYPE_CHECKING:  # whoever verifies an arm needs no robots, and few need repair
     from vdsm_pin.repair.rounds import Repaired
-    from vdsm_pin.report.drawing import Drawing
     from vdsm_pin.robots.cell import Cell
 
 ProblemOrCell: TypeAlias = "PlanningProblem | Cell"
@@ -50,9 +49,6 @@ class Subject(Protocol):
 
     def at_start(self) -> Any:
         """The motion that stays where the arm or robot begins."""
-
-    def drawing(self, motion: Any) -> "Drawing":
-        """How a motion looks."""
 
     def checked(self, motion: Any) -> Any:
         """A motion that was made in Python, with its columns in the robot's order.

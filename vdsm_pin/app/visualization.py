@@ -21,6 +21,7 @@ from vdsm_pin.io.atomic import write_text
 from vdsm_pin.report.drawing import Drawing
 from vdsm_pin.report.folder import check_outputs
 from vdsm_pin.report.html import message_page, view_page
+from vdsm_pin.report.page_data import drawing_of
 
 HOST: Final = "127.0.0.1"
 _LONGEST_WAIT: Final = 20.0  # seconds a page waits for one answer
@@ -35,7 +36,7 @@ def drawing(problem: ProblemOrCell, trajectory: Path | None) -> Drawing:
     """
     subject = subject_of(problem)
     motion = subject.at_start() if trajectory is None else subject.read(trajectory)
-    return subject.drawing(motion)
+    return drawing_of(problem, motion)
 
 
 def write_page(path: Path, problem: str, trajectory: Path | None) -> None:

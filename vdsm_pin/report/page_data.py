@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem.any_problem import AnyMotion, AnyProblem
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.arm_drawing import ArmDrawing
 from vdsm_pin.report.charts import clearance_charts
 from vdsm_pin.report.drawing import Drawing
@@ -18,23 +21,24 @@ from vdsm_pin.report.reason import failing
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles, thinned
 from vdsm_pin.report.words import finite
 from vdsm_pin.verification.records import (
-    ArmVerification,
     ClosestApproach,
     Counterexample,
     Verification,
 )
 
 
-def drawing_of(verification: Verification) -> Drawing:
-    """How a motion that was judged is drawn."""
-    if isinstance(verification, ArmVerification):
-        return ArmDrawing(verification.problem, verification.trajectory)
+def drawing_of(problem: AnyProblem, motion: AnyMotion) -> Drawing:
+    """How a motion of a snake arm or of any other robot is drawn."""
+    if isinstance(problem, PlanningProblem):
+        assert isinstance(motion, Trajectory)
+        return ArmDrawing(problem, motion)
     # Whoever draws an arm needs no robots.
     from vdsm_pin.report.robot_drawing import RobotDrawing
-    from vdsm_pin.robots.judgement import RobotVerification
+    from vdsm_pin.robots.cell import Cell
 
-    assert isinstance(verification, RobotVerification)
-    return RobotDrawing(verification.problem, verification.trajectory)
+    assert isinstance(problem, Cell)
+    assert isinstance(motion, JointTrajectory)
+    return RobotDrawing(problem, motion)
 
 
 def closest_data(
@@ -68,7 +72,9 @@ def ghost_data(verification: Verification, found: Counterexample) -> dict[str, A
         words.append("errors of base and obstacles are not drawn")
     if verification.nominal_clear:
         words.append("the nominal motion is clear")
-    stance = drawing_of(verification).stance(found.joints)
+    stance = drawing_of(verification.problem, verification.trajectory).stance(
+        found.joints
+    )
     return {"moment": found.moment, "words": words, **stance}
 
 
@@ -86,7 +92,7 @@ def report_data(verification: Verification) -> dict[str, Any]:
     remarkable += [one.interval for one in lost]
     intervals = np.array(remarkable, dtype=np.int64)
     shown = thinned(verification.trajectory, np.concatenate([intervals, intervals + 1]))
-    drawing = drawing_of(verification)
+    drawing = drawing_of(verification.problem, verification.trajectory)
     plots = drawing.charts(shown, clearance_charts(verification, shown, drawing.names))
     obstacles = verification.problem.scene.obstacles
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]

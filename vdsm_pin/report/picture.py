@@ -31,7 +31,7 @@ def picture(verification: Verification) -> str:
     """The arm or robot at the moment of its smallest clearance, in its scene."""
     near = verification.approaches[:1]
     moment = near[0].moment if near else 0.0
-    drawing = drawing_of(verification)
+    drawing = drawing_of(verification.problem, verification.trajectory)
     shape = drawing.silhouette(moment)
     links, path = list(map(_view, shape.links)), _view(_thin(drawing.path))
     everything = np.vstack([*links, path])
