@@ -1,4 +1,4 @@
-"""An arm, a scene and a path without any file: an endoscope of 300 mm in a tube."""
+"""An arm, a scene and a path made in Python: an endoscope of 300 mm in a tube."""
 
 import numpy as np
 
@@ -28,6 +28,7 @@ tip = arm.total_length * x
 corners = tip + np.array([[0, 0, 0.03], [0, -0.06, 0.0], [0, 0, -0.03], [0, 0.03, 0]])
 path = vp.DesiredPath(tip, corners, closed=True, spacing=0.001)
 problem = vp.Problem("endoscope", arm, scene, path, 0.0005, np.eye(4))
+problem = vp.write_problem(problem, "endoscope.yaml")  # certificates need a file
 
 plan = vp.plan(problem)
 result = vp.verify(problem, plan.trajectory)
@@ -35,3 +36,4 @@ print(plan)
 print(result)
 assert result.verdict is vp.Verdict.CERTIFIED
 vp.write_report(result, "arm_in_python.html")
+vp.write_certificate(result, "endoscope.certificate")

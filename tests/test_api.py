@@ -100,6 +100,33 @@ def test_a_problem_built_in_python_is_planned_verified_and_reported(
         vp.write_certificate(result, tmp_path / "c", file)
 
 
+def test_a_problem_built_in_python_is_certified_once_it_is_a_file(
+    tmp_path: Path,
+) -> None:
+    problem = vp.write_problem(in_python(), tmp_path / "p.yaml")
+    assert problem == in_python() and problem.source is not None
+    result = vp.verify(problem, vp.plan(problem).trajectory)
+    proof, motion = tmp_path / "c.certificate", tmp_path / "c.csv"
+    vp.write_certificate(result, proof)
+    assert check_certificate(proof, problem.source.path, motion).accepted
+    content = motion.read_bytes()
+    vp.write_certificate(result, proof)  # the same motion stands there
+    assert motion.read_bytes() == content
+    motion.write_bytes(b"".join(content.splitlines(keepends=True)[:-1]))
+    with pytest.raises(vp.InvalidInput, match="is another motion"):
+        vp.write_certificate(result, proof)
+
+
+def test_what_is_not_certified_leaves_no_file(tmp_path: Path) -> None:
+    problem = vp.write_problem(in_python(), tmp_path / "p.yaml")
+    motion = vp.plan(problem).trajectory
+    result = vp.verify(problem, motion, errors=vp.ErrorBox(base_mm=200.0))
+    assert result.verdict is not vp.Verdict.CERTIFIED
+    with pytest.raises(vp.VdsmError, match="verdict is"):
+        vp.write_certificate(result, tmp_path / "c.certificate")
+    assert [one.name for one in tmp_path.iterdir()] == ["p.yaml"]
+
+
 def test_a_certificate_is_of_the_files_that_were_verified(tmp_path: Path) -> None:
     problem = vp.read_problem("paper/free")
     plan = vp.plan(problem, "paper")
@@ -129,7 +156,7 @@ def test_no_certificate_of_what_is_not_certified(tmp_path: Path) -> None:
     problem = vp.read_problem("paper/obs1")
     straight = vp.plan(vp.read_problem("paper/free"), "paper").trajectory
     result = vp.verify(problem, straight)
-    assert result.verdict is vp.Verdict.REFUTED
+    assert result.verdict is not vp.Verdict.CERTIFIED
     file = tmp_path / "t.csv"
     vp.write_trajectory(file, straight)
     with pytest.raises(VerificationFailed, match="refuted"):
@@ -277,7 +304,7 @@ def test_the_papers_joint_error_touches(
     if depth_mm is None:
         assert result.verdict is vp.Verdict.CERTIFIED
         return
-    assert result.verdict is vp.Verdict.REFUTED
+    assert result.verdict is not vp.Verdict.CERTIFIED
     worst = min(found.clearance for found in result.counterexamples)
     assert depth_mm - 0.1 < 1e3 * worst <= depth_mm  # at least so deep
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         repair_trajectory,
         verify,
         write_certificate,
+        write_problem,
         write_report,
         write_trajectory,
     )
@@ -83,6 +84,7 @@ __all__ = [
     "repair_trajectory",
     "verify",
     "write_certificate",
+    "write_problem",
     "write_report",
     "write_trajectory",
 ]

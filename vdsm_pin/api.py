@@ -272,20 +272,60 @@ def _judged(result: Any, options: MotionOptions = NO_OPTIONS) -> Subject:
     return _subject(result.problem, options)
 
 
+def write_problem(problem: PlanningProblem, path: str | Path) -> PlanningProblem:
+    """Write a problem that was built in Python as a problem file.
+
+    Args:
+        problem: Of a snake arm. Its meshes and clouds are written beside the file.
+        path: The file; it appears whole or not at all.
+
+    Returns:
+        The problem as it is read from that file. Certificates are bound to it: plan and
+        verify this one. Degrees and frames may change the last digit of a value.
+
+    Raises:
+        InvalidInput: If it has what no problem file says, as obstacles that are carried
+            by another robot or a prism that is not along an axis.
+        InvalidFile: If a file cannot be written, or what is written makes no problem,
+            as where links that are too short always touch.
+
+    Example:
+        >>> import numpy as np
+        >>> import vdsm_pin as vp
+        >>> ball = vp.Sphere("ball", np.array([2.0, 0.5, 0.0]), 0.1)
+        >>> path = vp.DesiredPath(np.array([3.126, 0, 0]), np.array([[3.1, 0.4, 0.2]]))
+        >>> arm, scene = vp.built_in("hrm8"), vp.Scene((ball,))
+        >>> problem = vp.Problem("one", arm, scene, path, 0.01, np.eye(4))
+        >>> problem = write_problem(problem, "out/api/one.yaml")
+        >>> problem.source.path.name
+        'one.yaml'
+    """
+    from vdsm_pin.io.problem_writer import write_problem as write
+    from vdsm_pin.report.folder import check_kept
+
+    file = path_of(path)
+    expect(problem, PlanningProblem, "Problem(...)")
+    check_kept([file], problem.files)
+    write(file, problem)
+    return read_problem(file)
+
+
 def write_certificate(
     result: Verification,
     path: str | Path,
-    trajectory: str | Path,
+    trajectory: str | Path | None = None,
     *,
     topic: str | None = None,
 ) -> None:
     """Write the proof of a certified motion, for `vdsm check-certificate`.
 
     Args:
-        result: What `verify` returned, of a problem that was read from a file.
+        result: What `verify` returned, of a problem that was read from a file
+            (`write_problem` makes one).
         path: The certificate; it appears whole or not at all.
         trajectory: The file that holds the motion that was judged, to whose bytes the
-            certificate is bound; `write_trajectory` writes it.
+            certificate is bound. Default: it is written beside the certificate, as
+            NAME.csv.
         topic: Of the motion, in a bag.
 
     Raises:
@@ -296,13 +336,13 @@ def write_certificate(
 
     Example:
         >>> problem = read_problem("paper/free")
-        >>> made = plan(problem, strategy="paper")
-        >>> write_trajectory("out/api/free.csv", made.trajectory)
-        >>> result = verify(problem, made.trajectory)
-        >>> write_certificate(result, "out/api/free.certificate", "out/api/free.csv")
+        >>> result = verify(problem, plan(problem, strategy="paper").trajectory)
+        >>> write_certificate(result, "out/api/free.certificate")
+        >>> Path("out/api/free.csv").exists()
+        True
     """
     from vdsm_pin.certificate_writer.certificate import write_certificate as write
-    from vdsm_pin.certificate_writer.lines import Hashes
+    from vdsm_pin.certificate_writer.lines import Hashes, check_certified
     from vdsm_pin.io.source import check_unchanged, readable, sha256_of_file
     from vdsm_pin.report.folder import check_kept
 
@@ -310,20 +350,31 @@ def write_certificate(
     if isinstance(result, ArmVerification):
         joined = result.trajectory.interpolation
     subject = _judged(result, MotionOptions(interpolation=joined, topic=topic))
-    file, source = path_of(trajectory), result.problem.source
+    source = result.problem.source
     if source is None or not source.is_whole:
-        message = "a certificate is bound to a problem file; this problem has none"
+        message = (
+            "a certificate is bound to a problem file; this problem has none "
+            "(write_problem writes one of a snake arm's)"
+        )
         raise InvalidInput(message)
+    certificate = path_of(path)
+    file = (
+        certificate.with_suffix(".csv") if trajectory is None else path_of(trajectory)
+    )
+    if trajectory is None and not file.exists():
+        check_certified(result)
+        check_kept([certificate, file], source.files)
+        subject.write(file, result.trajectory)
     with readable(file):
         digest = sha256_of_file(file)
     same = subject.is_of(result, subject.read(file))
     check_unchanged(file, digest)
     if not same:
-        message = f"{trajectory}: is another motion than the verified one"
+        message = f"{file}: is another motion than the verified one"
         raise InvalidInput(message)
-    check_kept([path_of(path)], [*source.files, file])
+    check_kept([certificate], [*source.files, file])
     hashes = Hashes(problem=source.sha256, trajectory=digest)
-    write(path_of(path), result, hashes, topic=topic)
+    write(certificate, result, hashes, topic=topic)
 
 
 @overload

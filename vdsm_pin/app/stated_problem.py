@@ -5,12 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
 from vdsm_pin.app.subjects import ProblemOrCell
 from vdsm_pin.io.atomic import write_text
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.io.errors_field import stated_errors
 from vdsm_pin.report.folder import CERTIFICATES, check_outputs, problem_beside
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.files import RobotFiles
@@ -50,7 +49,7 @@ def problem_text(
         "robot": _given(robot),
         "required_clearance": cell.required_clearance * MM_PER_M,
         "required_self_clearance": cell.required_self_clearance * MM_PER_M,
-        "errors": _errors(cell.errors),
+        "errors": stated_errors(cell.errors, MM_PER_M),
         "scene": named(scene),
     }
     return yaml.safe_dump(_given(whole), sort_keys=False, allow_unicode=True)
@@ -59,29 +58,6 @@ def problem_text(
 def _given(values: Mapping[str, Any]) -> dict[str, Any]:
     """Those that are not empty; a clearance of 0 is stated."""
     return {key: value for key, value in values.items() if value not in (None, [], {})}
-
-
-def _errors(box: ErrorBox) -> dict[str, Any]:
-    """Errors as a problem file has them: in degrees and millimetres."""
-    turns = {one.name: _deg(one.turn) for one in box.named if one.turn}
-    slides = {one.name: one.shift * MM_PER_M for one in box.named if one.shift}
-    off = [
-        {"name": one.name, "shift": one.shift * MM_PER_M, "turn_deg": _deg(one.turn)}
-        for one in box.obstacles
-    ]
-    stated: dict[str, Any] = {
-        "joint_deg": turns or _deg(box.joint),
-        "slide": slides or box.slide * MM_PER_M,
-        "base": box.base * MM_PER_M,
-        "base_deg": _deg(box.base_turn),
-        "obstacle": box.obstacle * MM_PER_M,
-        "obstacles": off,
-    }
-    return {key: value for key, value in stated.items() if value}
-
-
-def _deg(angle: float) -> float:
-    return float(np.rad2deg(angle))
 
 
 def stated_cell(

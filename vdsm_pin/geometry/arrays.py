@@ -294,6 +294,22 @@ def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
     )
 
 
+def rpy_from_rotation(rotation: FloatArray) -> FloatArray:
+    """Roll, pitch and yaw of a rotation, shape (3,), as above; [rad].
+
+    Where pitch is 90 deg roll and yaw turn about the same axis: what one of them is
+    short of the other one has.
+
+    Args:
+        rotation: Shape (3, 3); [-].
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = rotation
+    yaw = np.arctan2(yx, xx)
+    c, s = np.cos(yaw), np.sin(yaw)
+    roll = np.arctan2(s * xz - c * yz, c * yy - s * xy)
+    return np.array([roll, np.arctan2(-zx, c * xx + s * yx), yaw])
+
+
 def turn_z_to(axis: FloatArray) -> FloatArray:
     """A rotation whose third column is the axis, shape (3, 3); [-]."""
     start = np.eye(3)[int(np.argmin(np.abs(axis)))]

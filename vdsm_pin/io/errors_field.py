@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeAlias
 
+import numpy as np
 from pydantic import Discriminator, Field, Tag
 
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.io.problem_errors import ErrorCollector
 from vdsm_pin.io.schema_types import FileModel, Name, NotNegative
@@ -106,3 +108,42 @@ class ErrorsModel(FileModel):
             obstacles=[(one.name, one.shift, one.turn_deg) for one in self.obstacles],
         )
         return ErrorBox(**fields)
+
+
+def stated_errors(box: ErrorBox, per_metre: float, n_links: int = 0) -> dict[str, Any]:
+    """Errors as a problem file has them, those that are none left out.
+
+    Args:
+        box: The errors.
+        per_metre: Of the file's unit of length.
+        n_links: Of a snake arm.
+
+    Raises:
+        InvalidInput: If alpha and theta of a joint are off by different angles.
+    """
+    each = []
+    if box.joints:
+        for alpha, theta in box.angles(n_links).tolist():
+            if alpha != theta:
+                message = "no problem file has errors of alpha and theta that differ"
+                raise InvalidInput(message)
+            each.append(_deg(alpha))
+    turns = {one.name: _deg(one.turn) for one in box.named if one.turn}
+    slides = {one.name: one.shift * per_metre for one in box.named if one.shift}
+    off = [
+        {"name": one.name, "shift": one.shift * per_metre, "turn_deg": _deg(one.turn)}
+        for one in box.obstacles
+    ]
+    stated: dict[str, Any] = {
+        "joint_deg": each or turns or _deg(box.joint),
+        "slide": slides or box.slide * per_metre,
+        "base": box.base * per_metre,
+        "base_deg": _deg(box.base_turn),
+        "obstacle": box.obstacle * per_metre,
+        "obstacles": off,
+    }
+    return {key: value for key, value in stated.items() if value}
+
+
+def _deg(angle: float) -> float:
+    return float(np.rad2deg(angle))
