@@ -11,16 +11,10 @@ from vdsm_pin.cli import options
 from vdsm_pin.cli.robot import Topic, refuse_beside
 from vdsm_pin.text import printable
 
-commands = options.family()
+commands = options.Family()
 
 
-@commands.command(
-    "check-certificate",
-    epilog=options.examples(
-        "vdsm check-certificate mine.certificate mine.yaml mine.csv"
-    ),
-)
-@options.grouped
+@commands.add("vdsm check-certificate mine.certificate mine.yaml mine.csv")
 def check_certificate(
     certificate: Annotated[
         Path,
@@ -52,12 +46,9 @@ def check_certificate(
     raise typer.Exit(status)
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm simulate paper/obs3 --trajectory out/obs3/trajectory.csv --out out/loop"
-    )
+@commands.add(
+    "vdsm simulate paper/obs3 --trajectory out/obs3/trajectory.csv --out out/loop"
 )
-@options.grouped
 def simulate(
     problem: options.ProblemArgument,
     trajectory: options.Trajectory,
@@ -92,13 +83,10 @@ def simulate(
     options.end(passed=passed)
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm explain paper/obs1 --out out/explain",
-        "vdsm explain paper/obs3 --waypoint 300 --out out/explain",
-    )
+@commands.add(
+    "vdsm explain paper/obs1 --out out/explain",
+    "vdsm explain paper/obs3 --waypoint 300 --out out/explain",
 )
-@options.grouped
 def explain(
     problem: options.ProblemArgument,
     out: options.OutFolder,
@@ -132,15 +120,12 @@ class Format(StrEnum):
     bag = "bag"
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
-        "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --also mcap "
-        "--out out/ros",
-        "vdsm convert mine.yaml --cables cables.csv --out out/mine",
-    )
+@commands.add(
+    "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
+    "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --also mcap "
+    "--out out/ros",
+    "vdsm convert mine.yaml --cables cables.csv --out out/mine",
 )
-@options.grouped
 def convert(
     problem: options.ProblemArgument,
     out: options.OutFolder,
@@ -183,8 +168,7 @@ def convert(
     answer.tell("\n".join(lines), waypoints=count, folder=out, notes=notes)
 
 
-@commands.command(epilog=options.examples("vdsm diff out/monday out/tuesday"))
-@options.grouped
+@commands.add("vdsm diff out/monday out/tuesday")
 def diff(
     old: Annotated[
         Path,

@@ -10,17 +10,14 @@ from vdsm_pin.cli.ending import INTERRUPTED, fail
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import COLD_PLAN_LIMIT
 
-commands = options.family()
+commands = options.Family()
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm batch --out out/demo",
-        "vdsm batch problems/*.yaml --out out/night --jobs 8 --time-limit 60 --resume",
-        "vdsm batch cell.yaml --trajectories plans --out out/plans",
-    )
+@commands.add(
+    "vdsm batch --out out/demo",
+    "vdsm batch problems/*.yaml --out out/night --jobs 8 --time-limit 60 --resume",
+    "vdsm batch cell.yaml --trajectories plans --out out/plans",
 )
-@options.grouped
 def batch(
     out: options.OutFolder = Path("out"),
     *,

@@ -8,7 +8,7 @@ from functools import wraps
 from inspect import Parameter, Signature, signature
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, NoReturn, TypeAlias
 
 import typer
 from typer.core import TyperCommand
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 PASSED: Final = 0
 NOT_PASSED: Final = 1
+
+Run: TypeAlias = Callable[..., None]
+"""What a command does."""
 
 
 def from_words(words: Iterable[str]) -> Callable[[str], list[str]]:
@@ -139,20 +142,22 @@ class _Command(TyperCommand):
         return super().parse_args(ctx, args)
 
 
-class _Family(typer.Typer):
-    def command(self, *given: Any, **how: Any) -> Any:
-        return super().command(*given, cls=_Command, **how)
-
-
-def family() -> typer.Typer:
+class Family(typer.Typer):
     """What the commands of one module are added to."""
-    # Without rich markup the help page is plain text and opens twice as fast.
-    return _Family(rich_markup_mode=None)
 
+    def __init__(self) -> None:
+        # Without rich markup the help page is plain text and opens twice as fast.
+        super().__init__(rich_markup_mode=None)
 
-def examples(*lines: str) -> str:
-    """Examples for a help page; the first line keeps click from joining them."""
-    return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
+    def add(self, *examples: str) -> Callable[[Run], Run]:
+        """Add a command, called as its function, with examples for its help page.
+
+        Its parameters that are groups of options become these, see `grouped`.
+        """
+        # The first line keeps click from joining them.
+        lines = ["\b", "Examples:", *(f"  {line}" for line in examples)]
+        add = self.command(cls=_Command, epilog="\n".join(lines))
+        return lambda run: add(grouped(run))
 
 
 class ErrorOptions(NamedTuple):
@@ -227,7 +232,7 @@ class ErrorOptions(NamedTuple):
         return tuple(found)
 
 
-def grouped(command: Callable[..., None]) -> Callable[..., None]:
+def grouped(command: Run) -> Run:
     """A command whose parameters that are groups of options become these options.
 
     A group is a `NamedTuple` of options with their defaults.

@@ -11,16 +11,13 @@ from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import Deadline, enforced
 
-commands = options.family()
+commands = options.Family()
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm plan paper/obs1 --out out/obs1",
-        "vdsm plan paper/obs1 --joint-error-deg 0.1 --out out/sturdy",
-    )
+@commands.add(
+    "vdsm plan paper/obs1 --out out/obs1",
+    "vdsm plan paper/obs1 --joint-error-deg 0.1 --out out/sturdy",
 )
-@options.grouped
 def plan(
     context: typer.Context,
     problem: options.ProblemArgument,

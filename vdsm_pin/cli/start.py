@@ -10,7 +10,7 @@ import typer
 from vdsm_pin.cli import options
 from vdsm_pin.text import printable
 
-commands = options.family()
+commands = options.Family()
 
 
 def _kinds_from(incomplete: str) -> list[str]:
@@ -25,11 +25,7 @@ def _schemas_from(incomplete: str) -> list[str]:
     return options.from_words(SCHEMA_NAMES)(incomplete)
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm problems", "vdsm problems --show paper/obs1 > mine.yaml"
-    )
-)
+@commands.add("vdsm problems", "vdsm problems --show paper/obs1 > mine.yaml")
 def problems(
     show: Annotated[
         str | None,
@@ -45,10 +41,7 @@ def problems(
     typer.echo(names if show is None else built_in_text(show), nl=False)
 
 
-@commands.command(
-    epilog=options.examples("vdsm new mine", "vdsm new cell --from robot")
-)
-@options.grouped
+@commands.add("vdsm new mine", "vdsm new cell --from robot")
 def new(
     folder: Annotated[
         Path, typer.Argument(metavar="NAME", help="Folder to make; names the problem.")
@@ -77,8 +70,7 @@ def new(
     answer.tell(text, folder=folder, files=files, next=then)
 
 
-@commands.command(epilog=options.examples("vdsm doctor"))
-@options.grouped
+@commands.add("vdsm doctor")
 def doctor(*, answer: options.Answer) -> None:
     """Say what this installation can do and lacks.
 
@@ -98,7 +90,7 @@ def doctor(*, answer: options.Answer) -> None:
     options.end(passed=not lacking)
 
 
-@commands.command(epilog=options.examples("vdsm schema verification"))
+@commands.add("vdsm schema verification")
 def schema(
     name: Annotated[
         str,
@@ -118,12 +110,7 @@ def schema(
     typer.echo(schema_text(schema(name)), nl=False)
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm urdf hrm8 --out hrm8.urdf", "vdsm urdf mine.yaml --out a.urdf"
-    )
-)
-@options.grouped
+@commands.add("vdsm urdf hrm8 --out hrm8.urdf", "vdsm urdf mine.yaml --out a.urdf")
 def urdf(
     name: Annotated[
         str,

@@ -17,21 +17,18 @@ if TYPE_CHECKING:
     from vdsm_pin.problem.planning_problem import PlanningProblem
     from vdsm_pin.robots.cell import Cell
 
-commands = options.family()
+commands = options.Family()
 
 Interpolation = Literal["auto", "linear", "cubic", "quintic"]
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1",
-        "vdsm verify mine.yaml --trajectory mine.csv --out out/mine "
-        "--certificate mine.certificate",
-        "vdsm verify --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
-        "--trajectory plan.csv --required-clearance-mm 5 --out out/ur5",
-    )
+@commands.add(
+    "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1",
+    "vdsm verify mine.yaml --trajectory mine.csv --out out/mine "
+    "--certificate mine.certificate",
+    "vdsm verify --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
+    "--trajectory plan.csv --required-clearance-mm 5 --out out/ur5",
 )
-@options.grouped
 def verify(
     context: typer.Context,
     trajectory: options.Trajectory,
@@ -165,15 +162,12 @@ def _verify_and_tell(order: "VerifyOrder", answer: options.Answer) -> bool:
     return outcome(verified.content.verdict).passed and not verified.no_certificate
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm repair paper/obs1 --trajectory mine.csv --out out/mine",
-        "vdsm repair cell.yaml --trajectory plan.csv --out out/cell",
-        "vdsm repair --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
-        "--trajectory plan.csv --out out/ur5",
-    )
+@commands.add(
+    "vdsm repair paper/obs1 --trajectory mine.csv --out out/mine",
+    "vdsm repair cell.yaml --trajectory plan.csv --out out/cell",
+    "vdsm repair --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
+    "--trajectory plan.csv --out out/ur5",
 )
-@options.grouped
 def repair(
     context: typer.Context,
     trajectory: options.Trajectory,

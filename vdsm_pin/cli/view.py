@@ -8,7 +8,7 @@ import typer
 from vdsm_pin.cli import options
 from vdsm_pin.cli.robot import refuse_beside
 
-commands = options.family()
+commands = options.Family()
 
 PORT: Final = 7000
 """Where a page is served."""
@@ -17,11 +17,9 @@ WIDTH, HEIGHT, OVERVIEW = 1280, 720, "overview"
 """How a picture is, unless asked for otherwise."""
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm view paper/obs1 --trajectory out/obs1/trajectory.csv",
-        "vdsm view paper/obs1 --html obs1.html",
-    )
+@commands.add(
+    "vdsm view paper/obs1 --trajectory out/obs1/trajectory.csv",
+    "vdsm view paper/obs1 --html obs1.html",
 )
 def view(
     problem: options.ProblemArgument,
@@ -51,14 +49,11 @@ def view(
     serve(problem, trajectory, port=port, watch=watch, announce=typer.echo)
 
 
-@commands.command(
-    epilog=options.examples(
-        "vdsm export paper/obs1 --trajectory out/obs1/trajectory.csv --out obs1.glb",
-        "vdsm export mine.yaml --trajectory mine.csv --out mine.png --moment 120",
-        "vdsm export mine.yaml --trajectory mine.csv --out mine.mp4 --look tip",
-    )
+@commands.add(
+    "vdsm export paper/obs1 --trajectory out/obs1/trajectory.csv --out obs1.glb",
+    "vdsm export mine.yaml --trajectory mine.csv --out mine.png --moment 120",
+    "vdsm export mine.yaml --trajectory mine.csv --out mine.mp4 --look tip",
 )
-@options.grouped
 def export(
     problem: options.ProblemArgument,
     out: Annotated[
