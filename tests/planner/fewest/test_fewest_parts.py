@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_angles, joint_centres, link_angles
 from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
 from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
@@ -439,3 +441,20 @@ def test_the_bound_of_the_tips_way_between_drawn_rows_is_within_the_spacing(
     _, bound = row_steps(arm, *joint_angles(arm, rows.centres))
     assert bound.max() <= spacing
     assert len(rows.share) < 200
+
+
+def test_rows_are_refused_where_no_arm_stands_between_two_corners() -> None:
+    # From elbow up to elbow down by way of the stretched arm, which is too long.
+    arm = replace(
+        built_in("hrm8"), link_lengths=np.ones(2), base_range=(0.0, 0.0),
+        cables=CableLayout(0.04, 0.1, paper_hole_angles(2)),
+    )  # fmt: skip
+    up = np.array([[0.6, 0.8, 0.0], [0.6, -0.8, 0.0]])
+    corners = Corners(
+        np.tile([1.2, 0.0, 0.0], (2, 1)), np.stack([up, up[::-1]]), np.zeros(2),
+        np.zeros(1, np.bool_),
+    )  # fmt: skip
+    ends = standing(arm, corners.tips, corners.offsets)
+    assert np.isfinite(ends).all()
+    with pytest.raises(NoPlanFound, match="no arm can stand"):
+        dense_rows(arm, corners, 0.01, 0.08, 1e-4)

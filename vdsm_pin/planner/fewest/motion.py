@@ -235,7 +235,8 @@ def dense_rows(
             space, from where the chart has it; [m].
 
     Raises:
-        NoPlanFound: If no number of rows is enough, as where a joint angle jumps.
+        NoPlanFound: If no number of rows is enough, as where a joint angle jumps, or
+            there is no arm between two corners.
     """
     travel = np.linalg.norm(np.diff(corners.tips, axis=0), axis=1)
     asked = counts = np.maximum(1, count_of(travel / spacing))
@@ -290,6 +291,9 @@ def _excess(
     """How many times as far as a row may each step turns or strays, shape (r - 1,).
 
     `most` has spacing, turn and stray of `dense_rows`.
+
+    Raises:
+        NoPlanFound: If there is no arm at a row or midway between two.
     """
     spacing, turn, stray = most
     alpha, theta = joint_angles(manipulator, rows.centres)
@@ -301,7 +305,11 @@ def _excess(
     most_stray = TOLERANCES.planned_stray * manipulator.total_length
     tip = np.sqrt(np.maximum(strays[:, -1] / most_stray, proved))
     bow = np.where(corners.drawn[rows.interval[:-1]], np.maximum(bow, tip), bow)
-    return np.asarray(np.maximum(step / turn, bow))
+    excess = np.maximum(step / turn, bow)
+    if not np.isfinite(excess).all():
+        message = "between two corners of the motion found no arm can stand"
+        raise NoPlanFound(message)
+    return np.asarray(excess)
 
 
 def _stray(

@@ -276,10 +276,13 @@ class _Search:
         """What was found, smoothed and row by row."""
         assert outcome.found is not None
         problem, judge = self.problem, outcome.judge
-        arm, corners = problem.manipulator, self._smoothed(clearance, outcome)
-        turn = problem.planned_row_change
-        rows = dense_rows(arm, corners, problem.path.spacing, turn, judge.slack)
-        alpha, theta = joint_angles(arm, rows.centres)
+        try:
+            corners = self._smoothed(clearance, outcome)
+            rows = self._rows(corners, judge.slack)
+        except NoPlanFound:  # of what is shorter; what was found may have rows
+            corners = outcome.found.corners
+            rows = self._rows(corners, judge.slack)
+        alpha, theta = joint_angles(problem.manipulator, rows.centres)
         # Proofs of what is needed ask no more than whether there is the clearance
         # required.
         enough = clearance.bare.up_to(problem.required_clearance)
@@ -294,6 +297,12 @@ class _Search:
             undrawn(problem, outcome),
             notes_of(problem, enough, outcome, trajectory, rows.centres),
         )
+
+    def _rows(self, corners: Corners, slack: float) -> Rows:
+        """A motion row by row; joint centres stray by no more than the slack; [m]."""
+        problem, turn = self.problem, self.problem.planned_row_change
+        spacing = problem.path.spacing
+        return dense_rows(problem.manipulator, corners, spacing, turn, slack)
 
     def _smoothed(self, clearance: BroadPhase, outcome: Explored) -> Corners:
         """What was found, shorter and with fewer knees, as far as there is time."""
