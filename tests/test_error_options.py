@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import vdsm_pin as vp
 from vdsm_pin.cli import app
 from vdsm_pin.cli.options import ErrorOptions
+from vdsm_pin.cli.robot import RobotOptions
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.problem import error_boxes
 from vdsm_pin.report.facts import error_box
@@ -95,9 +96,9 @@ def test_an_error_of_an_obstacle_that_is_not_stated_is_none(
         ("-1", None, None, "expected a number, 0 or more"),
         ("nan", None, None, "--joint-error-deg is 'nan'"),
         ("inf", None, None, "--joint-error-deg is 'inf'"),
-        ("0", ["a=-1"], None, "--obstacle-error-mm is '-1'"),
+        ("0", ["a=-1"], None, "--obstacle-error-mm is 'a=-1'"),
         ("0", ["1", "2"], None, "twice for all obstacles"),
-        ("0", ["a=1", "a=2"], None, "twice for a"),
+        ("0", ["a=1", "a=2"], None, "twice for 'a'"),
         ("0", None, ["1"], "needs the obstacle's name"),
     ],
 )
@@ -188,3 +189,24 @@ def test_a_repair_keeps_the_clearance_under_its_errors(tmp_path: Path) -> None:
     assert code == 0, text
     told = json.loads((tmp_path / "out" / "verification.json").read_text())
     assert told["error_box"]["obstacles"][0]["shift_m"] == pytest.approx(0.0549)
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (["turn"], "--lock is 'turn', expected JOINT=VALUE in radians or metres"),
+        (["turn=up"], "--lock is 'turn=up'"),
+        (["turn=inf"], "--lock is 'turn=inf'"),
+        (["turn=1_0"], "--lock is 'turn=1_0'"),
+        (["=1"], "--lock has no name, expected JOINT=VALUE"),
+        (["turn=1", "turn=2"], "--lock is given twice for 'turn'"),
+    ],
+)
+def test_what_locks_no_joint_is_refused(words: list[str], told: str) -> None:
+    with pytest.raises(InvalidInput, match=told):
+        RobotOptions(Path("a.urdf"), lock=words).files()
+
+
+def test_joints_are_locked_at_any_number() -> None:
+    files = RobotOptions(Path("a.urdf"), lock=["turn=-1.5", "slide=2e-3"]).files()
+    assert files.lock == {"turn": -1.5, "slide": 2e-3}

@@ -12,6 +12,7 @@
     │   ├── LinkTooShort      a projected gap exceeds its link
     │   ├── LimitExceeded     a joint limit would be broken
     │   ├── StartBlocked      the arm as it starts is too close to an obstacle
+    │   ├── StartFolded       two of its own bodies are too close to each other there
     │   ├── StartInside       the arm as it starts is inside a mesh
     │   ├── InsideUnknown     whether it is inside a mesh cannot be decided
     │   ├── PathBlocked       an obstacle is in the way of the tip

@@ -1,9 +1,7 @@
 """What commands share: arguments and options, exit codes, help pages."""
 
 import json
-import math
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from itertools import pairwise
@@ -15,6 +13,7 @@ from typer.core import TyperCommand
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.strategies import STRATEGIES
+from vdsm_pin.text import plain_number
 from vdsm_pin.time_limit import COLD_PLAN_LIMIT, PLAN_LIMIT
 
 if TYPE_CHECKING:
@@ -202,8 +201,8 @@ class ErrorOptions(NamedTuple):
         """
         from vdsm_pin.problem.error_boxes import TypedErrorBox
 
-        shifts = _by_name("--obstacle-error-mm", self.obstacle_error_mm or ())
-        turns = _by_name("--obstacle-error-deg", self.obstacle_error_deg or ())
+        shifts = by_name("--obstacle-error-mm", self.obstacle_error_mm or ())
+        turns = by_name("--obstacle-error-deg", self.obstacle_error_deg or ())
         if "" in turns:
             message = "--obstacle-error-deg needs the obstacle's name, NAME=DEG"
             raise InvalidInput(message)
@@ -274,30 +273,35 @@ def _of_joints(option: str, text: str) -> float | list[float] | dict[str, float]
     """One number, one for each joint, or some by name."""
     words = text.split(",")
     if "=" in text:
-        named = _by_name(option, words)
+        named = by_name(option, words)
         if "" in named:
             message = f"{option} is {text!r}, expected a name before each number"
             raise InvalidInput(message)
         return named
-    each = [_number(option, word) for word in words]
+    each = [by_name(option, [word])[""] for word in words]
     return each if len(each) > 1 else each[0]
 
 
-def _by_name(option: str, words: Sequence[str]) -> dict[str, float]:
-    """Numbers by the names before them; an empty name where there is none."""
+def by_name(
+    option: str,
+    words: Sequence[str],
+    least: float = 0.0,
+    expected: str = "a number, 0 or more",
+) -> dict[str, float]:
+    """Numbers by the names before them; an empty name where there is none.
+
+    Raises:
+        InvalidInput: If one is no number or below the least, or a name is there twice.
+    """
     found = {}
     for word in words:
         name, _, number = word.rpartition("=")
         if name in found:
-            message = f"{option} is given twice for {name or 'all obstacles'}"
+            whose = repr(name) if name else "all obstacles"
+            message = f"{option} is given twice for {whose}"
             raise InvalidInput(message)
-        found[name] = _number(option, number)
+        found[name] = plain_number(number)
+        if not least <= found[name]:
+            message = f"{option} is {word!r}, expected {expected}"
+            raise InvalidInput(message)
     return found
-
-
-def _number(option: str, word: str) -> float:
-    with suppress(ValueError):
-        if 0.0 <= (value := float(word)) < math.inf:
-            return value
-    message = f"{option} is {word!r}, expected a number, 0 or more"
-    raise InvalidInput(message)

@@ -1,10 +1,11 @@
 """What commands ask about a robot of a URDF: by options, or in a problem file."""
 
 from collections.abc import Mapping
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
-from vdsm_pin.cli.options import option, problem_argument
+from vdsm_pin.cli.options import by_name, option, problem_argument
 from vdsm_pin.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -86,15 +87,19 @@ class RobotOptions(NamedTuple):
         Raises:
             InvalidInput: If a value makes no sense.
         """
-        from vdsm_pin.robots.cell import locks
         from vdsm_pin.robots.files import RobotFiles, solids_of
 
         assert self.urdf is not None
+        form = "JOINT=VALUE in radians or metres"
+        lock = by_name("--lock", self.lock or (), -inf, form)
+        if "" in lock:
+            message = f"--lock has no name, expected {form}"
+            raise InvalidInput(message)
         return RobotFiles(
             urdf=self.urdf,
             srdf=self.srdf,
             package_dirs=tuple(self.package_dir or ()),
-            lock=locks(tuple(self.lock or ())),
+            lock=lock,
             group=self.group,
             solids=solids_of(self.bodies, self.parts),
             joint_limits=self.joint_limits,

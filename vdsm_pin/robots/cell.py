@@ -260,28 +260,6 @@ def cell_of_file(file: CellFile) -> Cell:
         return cell.under(file.errors(found.scene))
 
 
-def locks(words: tuple[str, ...]) -> dict[str, float]:
-    """Values of joints by NAME=VALUE; [rad] or [m].
-
-    Raises:
-        InvalidInput: If one is of another form.
-    """
-    found = {}
-    for word in words:
-        name, _, value = word.partition("=")
-        if name in found:
-            message = f"--lock is given twice for {name!r}"
-            raise InvalidInput(message)
-        try:
-            found[name] = float(value)
-        except ValueError:
-            found[name] = np.nan
-        if not name or not np.isfinite(found[name]):
-            message = f"--lock is {word!r}, expected JOINT=VALUE in radians or metres"
-            raise InvalidInput(message)
-    return found
-
-
 def _others(robot: Robot) -> list[str]:
     """Names of the links besides those that stand as the root link does."""
     return [name for name, frame in robot.frames.items() if frame != ROOT_FRAME]
