@@ -2,22 +2,24 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf, nan
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final
 
 import numpy as np
 
 from benchmarks.foreign_plans.sampled import Sampled
+from vdsm_pin.api import write_certificate
+from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
-from vdsm_pin.problem.scene import Scene
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
-from vdsm_pin.robots.model import Robot
 from vdsm_pin.verification.records import CLEARANCES, Verdict, combine
 
 DENSITIES: Final = ("0.01", "0.005", "1 deg", "1 mm")
@@ -31,6 +33,11 @@ RUNS: Final = 3
 
 AGREED: Final = 1e-6
 """Contact within which no verdict is asked; [m]."""
+
+BOTH: Final = ("required_clearance", "required_self_clearance")
+
+GRAZE: Final = 2e-6
+"""A clearance that is asked for is so near to the least one, to either side; [m]."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,7 @@ class Judged:
         fault: Where judges contradict each other; empty where not.
         repair_s: Processor time of its repair; inf where there is none, NaN where none
             is asked for; [s].
+        proof: Of a certified plan, what its certificate is; None of others.
     """
 
     plan: Plan
@@ -74,26 +82,46 @@ class Judged:
     depth: float
     fault: str
     repair_s: float
+    proof: "Proof | None" = None
 
 
-def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
+@dataclass(frozen=True)
+class Proof:
+    """The certificate of a plan, and the same plan where it just grazes.
+
+    Args:
+        size: Of the certificate; [bytes].
+        checked_s: Processor time of its checking; [s].
+        accepted: Whether the checker accepts it.
+        grazing_ms: Processor time of judging the plan against clearances that are
+            `GRAZE` below and above its least one, the longer one; [ms].
+        grazing: Whether the one is certified and the other refuted.
+    """
+
+    size: int
+    checked_s: float
+    accepted: bool
+    grazing_ms: float
+    grazing: bool
+
+
+def judge(plan: Plan, sampled: Sampled, asked: Cell) -> Judged:
     """Judge a plan.
 
     Args:
         plan: The plan.
         sampled: The oracle.
-        robot: As the proof reads it.
-        scene: As the proof reads it.
+        asked: As the proof reads it, from a problem file.
     """
     rows = np.array(plan.waypoints)
-    joints = tuple(joint.name for joint in robot.joints)
+    joints = tuple(joint.name for joint in asked.robot.joints)
     motion = JointTrajectory(joints, rows)
     first = JointTrajectory(joints, rows[:1])
-    verify_robot(Cell(robot, scene), first)  # compiled, nothing kept
+    verify_robot(Cell(asked.robot, asked.scene), first)  # compiled, nothing kept
     spent = inf
     for _ in range(RUNS):
         begin = time.process_time()
-        cell = Cell(robot, scene)
+        cell = Cell(asked.robot, asked.scene)
         found = verify_robot(cell, motion, contacts=False)
         spent = min(spent, 1e3 * (time.process_time() - begin))
     about = [one.verdict for one in found.checks if one.name in CLEARANCES]
@@ -107,6 +135,7 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     if verdict is Verdict.REFUTED:
         seconds, repaired = _repair(cell, motion)
         fault += _fault(sampled, repaired, Verdict.CERTIFIED, hit=False, near=0.0)
+    proof = _proof(asked, motion) if verdict is Verdict.CERTIFIED else None
     return Judged(
         plan=plan,
         verdict=verdict.value,
@@ -115,7 +144,30 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
         depth=-min(least, near, 0.0),
         fault=fault,
         repair_s=seconds,
+        proof=proof,
     )
+
+
+def _proof(asked: Cell, motion: JointTrajectory) -> Proof:
+    """The certificate of a plan, checked, and the plan where it grazes."""
+    found = verify_robot(asked, motion, contacts=False)
+    least = float(found.least.lower.min())
+    said, spent = [], 0.0
+    for clearance in (least - GRAZE, least + GRAZE):
+        begin, just = time.process_time(), max(clearance, 0.0)
+        near = verify_robot(replace(asked, **{name: just for name in BOTH}), motion)
+        spent = max(spent, 1e3 * (time.process_time() - begin))
+        said.append(
+            combine(tuple(o.verdict for o in near.checks if o.name in CLEARANCES))
+        )
+    with TemporaryDirectory() as folder:
+        file, rows = Path(folder) / "c.certificate", Path(folder) / "c.csv"
+        write_certificate(found, file)
+        begin, problem = time.process_time(), asked.files[0]
+        accepted = check_certificate(file, problem, rows).accepted
+        seconds, size = time.process_time() - begin, file.stat().st_size
+    grazing = said == [Verdict.CERTIFIED, Verdict.REFUTED]
+    return Proof(size, seconds, accepted, spent, grazing)
 
 
 def _repair(cell: Cell, motion: JointTrajectory) -> tuple[float, FloatArray]:

@@ -18,9 +18,11 @@ from benchmarks.foreign_plans.judges import Judged, Plan, judge
 from benchmarks.foreign_plans.problems import ARMS, ROBOTS, Problem, problems, source
 from benchmarks.foreign_plans.sampled import Sampled
 from benchmarks.foreign_plans.summary import document
+from vdsm_pin.app.stated_problem import problem_text
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.urdf import read_robot
 
 RESOLUTIONS: Final = (0.01, 0.005)
@@ -39,7 +41,8 @@ def outcomes(
     """
     folder = source(name)
     urdf, srdf = folder / f"{name}.urdf", folder / f"{name}.srdf"
-    robot = read_robot(RobotFiles(urdf, srdf, group=ARMS[name]))
+    files = RobotFiles(urdf, srdf, group=ARMS[name])
+    robot = read_robot(files)
     with tempfile.TemporaryDirectory() as aside:
         for problem in problems(name, per_set, Path(aside)):
             sampled = Sampled(name, problem.scene)
@@ -48,8 +51,11 @@ def outcomes(
                 raise InvalidInput(message)
             key = name, problem.family, problem.number
             plans = stored.get(key, []) if stored else _planned(problem, sampled)
-            scene = read_scene_with_files(problem.scene, 1.0)[0]
-            yield problem, [judge(plan, sampled, robot, scene) for plan in plans]
+            text = problem_text(Cell(robot, Scene()), files, problem.scene, Path(aside))
+            file = Path(aside) / "cell.yaml"
+            file.write_text(text, encoding="utf-8")
+            asked = read_cell(file)
+            yield problem, [judge(plan, sampled, asked) for plan in plans]
 
 
 def _planned(problem: Problem, sampled: Sampled) -> list[Plan]:

@@ -1,7 +1,8 @@
 """The page of the benchmark."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
+from itertools import groupby
 
 import numpy as np
 
@@ -29,13 +30,24 @@ HEAD = (
     "repair, median [s]",
 )
 
+PROOFS = (
+    "robot",
+    "resolution",
+    "certificates",
+    "accepted",
+    "median [kB]",
+    "largest [kB]",
+    "checked in, median [s]",
+    "longest [s]",
+    "grazing, answered",
+    "median [ms]",
+    "longest [ms]",
+)
+
 
 def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
     """One table, and above it the sentence that it comes to."""
-    rows = [HEAD, ("---",) * len(HEAD)]
-    for key in sorted({_key(one) for one in judged}):
-        rows.append(_row([one for one in judged if _key(one) == key]))
-    table = "\n".join("| " + " | ".join(row) + " |" for row in rows)
+    groups = [list(group) for _, group in groupby(sorted(judged, key=_key), _key)]
     faults = [o for o in judged if o.fault]
     lines = [
         "# Plans of OMPL, judged",
@@ -47,11 +59,16 @@ def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
         "collision. Deepest: by Coal. Times: processor time of a whole verification, "
         "Pinocchio and Coal included, the least of three. Repaired: of what collides. "
         "`python -m benchmarks.foreign_plans.run`.",
-        table,
+        _table(HEAD, map(_row, groups)),
         f"Verdicts that Coal contradicts: {len(faults)} (in {DENSE:,} states of each "
         "certified plan it looks for a contact). Problems and resolutions "
         f"without a plan: {len(unplanned)}"
         f"{_where(unplanned)}.",
+        "Certificates of the plans that are certified, and how long the separate "
+        "program checks them. Grazing: each of these plans once more with a required "
+        "clearance 2 um below its least one and once 2 um above; answered where the "
+        "one is certified and the other refuted. The longer of both times.",
+        _table(PROOFS, filter(None, map(_proofs, groups))),
         described(surroundings()).rstrip(".") + f", {_ompl()}.",
     ]
     return "\n\n".join(lines) + "\n"
@@ -102,6 +119,31 @@ def _row(judged: Sequence[Judged]) -> tuple[str, ...]:
         f"{sum(second <= 1.0 for second in repairs)} of {len(repairs)}",
         f"{np.median(repairs) if repairs else np.nan:.2f}",
     )
+
+
+def _proofs(judged: Sequence[Judged]) -> tuple[str, ...]:
+    """What the certificates come to; nothing where there are none."""
+    proofs = [one.proof for one in judged if one.proof]
+    if not proofs:
+        return ()
+    sizes = [one.size / 1e3 for one in proofs]
+    checked = [one.checked_s for one in proofs]
+    grazing = [one.grazing_ms for one in proofs]
+    return (
+        judged[0].plan.robot,
+        f"{judged[0].plan.resolution:g}",
+        str(len(proofs)),
+        str(sum(one.accepted for one in proofs)),
+        *(f"{value:.1f}" for value in (np.median(sizes), max(sizes))),
+        *(f"{value:.2f}" for value in (np.median(checked), max(checked))),
+        f"{sum(one.grazing for one in proofs)} of {len(proofs)}",
+        *(f"{value:.0f}" for value in (np.median(grazing), max(grazing))),
+    )
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def _where(unplanned: Sequence[Problem]) -> str:

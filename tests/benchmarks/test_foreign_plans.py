@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles.shortcuts import read_scene
 
 from benchmarks.foreign_plans.judges import Plan, _fault, judge
 from benchmarks.foreign_plans.problems import FOLDER, problems
@@ -16,8 +15,7 @@ from benchmarks.foreign_plans.run import outcomes
 from benchmarks.foreign_plans.sampled import Sampled
 from benchmarks.foreign_plans.summary import document
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.robots.cell import read_cell
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two"><link name="foot"/>
@@ -90,7 +88,11 @@ def test_plan_through_a_thin_post_is_refuted_and_missed_by_its_own_samples(
     assert not any(away.caught)
     assert not through.fault
     assert not away.fault
+    # The box that turns stays clear of the post; its certificate says so.
+    assert through.proof is None
+    assert away.proof is not None and away.proof.accepted and away.proof.grazing
     page = document(found, [])
+    assert "| panda | 0.005 | 1 | 1 |" in page
     assert "Of 1 plans that OMPL's RRTConnect returns" in page
     assert "| panda | 0.01 | 1 | 1 (100 %)" in page
 
@@ -105,10 +107,16 @@ def test_false_verdicts_are_faults(folder: Path, tmp_path: Path) -> None:
     )
     assert "0.1" in _fault(sampled, through, Verdict.REFUTED, hit=False, near=1e-4)
     files = folder / "panda/panda.urdf", folder / "panda/panda.srdf"
-    robot = read_robot(RobotFiles(*files, group="panda_arm"))
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(
+        "vdsm_problem: 1\nlength_unit: m\nrequired_clearance: 0\n"
+        f"robot: {{urdf: {files[0]}, srdf: {files[1]}, group: panda_arm}}\n"
+        f"scene: {problem.scene}\n",
+        encoding="utf-8",
+    )
     plan = Plan("panda", "post", 1, 0.01, through.tolist())
-    found = judge(plan, sampled, robot, read_scene(problem.scene, 1.0))
-    assert not found.fault
+    found = judge(plan, sampled, read_cell(cell))
+    assert not found.fault and found.proof is None
 
 
 def test_folder_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
