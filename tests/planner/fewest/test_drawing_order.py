@@ -11,7 +11,7 @@ from scenes_for_fewest import problem
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.fewest.sequence import shortest_tour, tour_length
+from vdsm_pin.planner.fewest.search import shortest_tour, tour_length
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.desired_path import Blocked, Order

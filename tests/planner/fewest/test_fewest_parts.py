@@ -21,7 +21,7 @@ from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
 from vdsm_pin.planner.fewest.roadmap_kernels import _drawing, _resting
 from vdsm_pin.planner.fewest.route import tip_route
-from vdsm_pin.planner.fewest.sequence import WEIGHTS
+from vdsm_pin.planner.fewest.search import WEIGHTS
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
 from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.planner.one_knee import pose_shapes

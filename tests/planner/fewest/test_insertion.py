@@ -30,10 +30,9 @@ from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
-from vdsm_pin.planner.fewest.sparsify import sparser
+from vdsm_pin.planner.fewest.smoothing import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
-from vdsm_pin.planner.fewest.tip_cells import TipCells
-from vdsm_pin.planner.fewest.tip_room import TipRoom
+from vdsm_pin.planner.fewest.tip_cells import TipCells, TipRoom
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.planner.records import Plan

@@ -13,8 +13,7 @@ from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners
-from vdsm_pin.planner.fewest.shortcut import shortcut
-from vdsm_pin.planner.fewest.sparsify import mean_knees
+from vdsm_pin.planner.fewest.smoothing import mean_knees, shortcut
 from vdsm_pin.planner.fewest.strategy import FEWEST, plan_fewest
 from vdsm_pin.report.motion_facts import motion_facts
 from vdsm_pin.tolerances import TOLERANCES

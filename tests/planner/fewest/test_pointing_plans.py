@@ -19,7 +19,7 @@ from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.route import tip_route
-from vdsm_pin.planner.fewest.sparsify import sparser
+from vdsm_pin.planner.fewest.smoothing import sparser
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.problem.desired_path import Blocked, DesiredPath

@@ -15,7 +15,7 @@ from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import QUICK, THOROUGH, Effort, Insert
 from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.roadmap import CostWeights
-from vdsm_pin.planner.fewest.shortcut import shortcut
+from vdsm_pin.planner.fewest.smoothing import shortcut
 from vdsm_pin.planner.fewest.strategy import CLEAREST, FEWEST
 from vdsm_pin.planner.fewest.unbend import unbend
 from vdsm_pin.problem.desired_path import Order

@@ -17,11 +17,11 @@ from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.planner.fewest import explore
+from vdsm_pin.planner.fewest.added_nodes import checked_start, with_start
 from vdsm_pin.planner.fewest.insertion import Inserted
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap
-from vdsm_pin.planner.fewest.start_node import checked_start, with_start
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
 from vdsm_pin.planner.paper.pipeline import plan_paper

@@ -18,7 +18,6 @@ from vdsm_pin.planner.fewest.explore import Explored, explore
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Effort, Insert
 from vdsm_pin.planner.fewest.motion import Corners
-from vdsm_pin.planner.fewest.narrow_passage import narrowest_passage
 from vdsm_pin.planner.fewest.notes import minimal
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.route import tip_route
@@ -28,6 +27,7 @@ from vdsm_pin.planner.fewest.stuck import (
     Stuck,
     at_reach,
     following,
+    narrowest_passage,
     no_way_in,
     on_the_path,
     passage,

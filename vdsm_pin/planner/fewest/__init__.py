@@ -1,11 +1,10 @@
 """Plans in any scene with few bent joints: one graph of sparse shapes.
 
 How a plan is made: `strategy` tells the story, `explore` goes through its searches. A
-`roadmap` of sparse `shapes` along a tip `route` is searched (`search`, `sequence`).
-Where it ends, arms are grown: along the path (`growth`) or through openings
-(`tip_routes`, `insertion`). A `judge` says what is clear. What was found is pulled
-straight (`shortcut`) and bends fewer joints (`sparsify`). `vdsm_pin.planner.impossible`
-proves what nobody can draw.
+`roadmap` of sparse `shapes` along a tip `route` is searched (`search`). Where it ends,
+arms are grown: along the path (`growth`) or through openings (`tip_routes`,
+`insertion`). A `judge` says what is clear. What was found is pulled straight and bends
+fewer joints (`smoothing`). `vdsm_pin.planner.impossible` proves what nobody can draw.
 
 Words of these modules:
 

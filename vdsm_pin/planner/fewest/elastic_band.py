@@ -12,7 +12,7 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.tip_room import LEAST, NARROW, TipRoom
+from vdsm_pin.planner.fewest.tip_cells import LEAST, NARROW, TipRoom
 from vdsm_pin.planner.spacing import spread
 from vdsm_pin.problem.pointing import angles_between
 

@@ -19,10 +19,11 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.explore import Explored
 from vdsm_pin.planner.fewest.motion import standing
-from vdsm_pin.planner.fewest.narrow_passage import Passage, narrowest_passage
 from vdsm_pin.planner.fewest.stuck import (
+    Passage,
     at_reach,
     following,
+    narrowest_passage,
     no_way_in,
     on_the_path,
     passage,

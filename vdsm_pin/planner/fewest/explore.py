@@ -16,10 +16,9 @@ import numpy as np
 from vdsm_pin.errors import NoWayOut, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray
 from vdsm_pin.planner.broad_phase import BroadPhase
-from vdsm_pin.planner.fewest.grown_nodes import fill
+from vdsm_pin.planner.fewest.added_nodes import fill, largest_start_angle, with_start
 from vdsm_pin.planner.fewest.insertion import insert
-from vdsm_pin.planner.fewest.joint_error import link_margins
-from vdsm_pin.planner.fewest.judge import Judge, link_limit
+from vdsm_pin.planner.fewest.judge import Judge, link_limit, link_margins
 from vdsm_pin.planner.fewest.levels import (
     BESIDE,
     FULL,
@@ -34,8 +33,7 @@ from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
 from vdsm_pin.planner.fewest.route import tip_route
 from vdsm_pin.planner.fewest.search import Found, Searched, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
-from vdsm_pin.planner.fewest.sparsify import mean_knees, sparser
-from vdsm_pin.planner.fewest.start_node import largest_start_angle, with_start
+from vdsm_pin.planner.fewest.smoothing import mean_knees, sparser
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips

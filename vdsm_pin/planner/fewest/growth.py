@@ -5,7 +5,7 @@ one away (`charts`). Children that are clear and can be reached from their paren
 on, half of them the best, half by chance. Where few do, the population is mutated at
 rest; where none does, it goes back some layers, is mutated there and tries again.
 
-The layers are those of the desired path, from nodes of the roadmap on (`grown_nodes`),
+The layers are those of the desired path, from nodes of the roadmap on (`added_nodes`),
 or those of a route of the tip from the start on (`insertion`). On a route one arm that
 follows it exactly (`follow_the_leader`) is among them as far as it is clear, and where
 the first tries fail a part of the children follow their parent's own curve.

@@ -14,13 +14,13 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.planner.fewest.added_nodes import checked_start
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Corners, standing
 from vdsm_pin.planner.fewest.route import TipRoute, tip_route
 from vdsm_pin.planner.fewest.search import Found
-from vdsm_pin.planner.fewest.start_node import checked_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.path_rows import PathRows

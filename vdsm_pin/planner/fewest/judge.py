@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.broad_phase import BroadPhase, cuts_of
@@ -41,6 +42,32 @@ BLOCK: Final = 512
 """Intervals judged at once, which bounds the memory for their parts."""
 THIRDS: Final = 40
 """Times the place where the base is farthest back is looked for in two thirds."""
+
+
+def levers(arm: Manipulator) -> FloatArray:
+    """How far the end of each link of the straight arm moves as all joints turn alike.
+
+    It is the sum of its distances to the joints before it; the second axis of a joint
+    adds a factor that is much the same for all links.
+
+    Returns:
+        Shape (N,), ascending; [m/rad].
+    """
+    joints = np.arange(1, arm.n_links + 1)
+    return np.asarray(np.cumsum(arm.link_lengths * joints))
+
+
+def link_margins(arm: Manipulator, error: float) -> FloatArray | None:
+    """What each link keeps for an error of all joints, None for no error.
+
+    Args:
+        arm: The arm.
+        error: Of every joint; [rad].
+
+    Returns:
+        Shape (N,), ascending; [m].
+    """
+    return error * levers(arm) if error > 0.0 else None
 
 
 def link_limit(problem: PlanningProblem) -> float:

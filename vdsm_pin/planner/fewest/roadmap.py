@@ -7,7 +7,6 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.joint_error import link_by_link
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.roadmap_kernels import Graph
 from vdsm_pin.planner.fewest.route import TipRoute
@@ -298,3 +297,25 @@ def extended(
     bends = judge.bends(roadmap.route.tips[tips], offsets)
     wider = replace(roadmap, shapes=shapes, node=same)
     return _with_nodes(wider, judge, weights, fresh, bends, clearances)
+
+
+def link_by_link(corners: FloatArray, stations: FloatArray) -> FloatArray:
+    """Joint centres of arms that are told by their corners.
+
+    Args:
+        corners: Base, knees and tip, in line between them, shape (v, p + 1, 3); [m].
+        stations: Arc length of the joints, shape (N + 1,); [m].
+
+    Returns:
+        Shape (v, N + 1, 3); [m].
+    """
+    sizes = np.linalg.norm(np.diff(corners, axis=1), axis=2)
+    ends = np.cumsum(sizes, axis=1)
+    piece = (stations[None, :, None] > ends[:, None, :-1]).sum(axis=2)
+    size = np.take_along_axis(sizes, piece, axis=1)
+    left = np.take_along_axis(ends, piece, axis=1) - stations
+    # A piece may have no length: two knees that are one.
+    share = (left / np.where(size > 0.0, size, 1.0))[..., None]
+    begin = np.take_along_axis(corners, piece[..., None], axis=1)
+    end = np.take_along_axis(corners, piece[..., None] + 1, axis=1)
+    return np.asarray(share * begin + (1.0 - share) * end)

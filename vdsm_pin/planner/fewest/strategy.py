@@ -18,15 +18,13 @@ from vdsm_pin.planner.fewest.explain import (
     say_drawn,
 )
 from vdsm_pin.planner.fewest.explore import Explored, explore
-from vdsm_pin.planner.fewest.joint_error import levers
-from vdsm_pin.planner.fewest.judge import check_cone
+from vdsm_pin.planner.fewest.judge import check_cone, levers
 from vdsm_pin.planner.fewest.levels import FULL, QUICK, Effort, leaning, pointed
 from vdsm_pin.planner.fewest.motion import Corners, Rows, dense_rows
 from vdsm_pin.planner.fewest.notes import notes_of, undrawn
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.search import Searched
-from vdsm_pin.planner.fewest.shortcut import lifted, shortcut, straightened
-from vdsm_pin.planner.fewest.sparsify import sparser
+from vdsm_pin.planner.fewest.smoothing import lifted, shortcut, sparser, straightened
 from vdsm_pin.planner.fewest.unbend import (
     from_there,
     leans_ahead,

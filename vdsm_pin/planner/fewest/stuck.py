@@ -1,18 +1,25 @@
 """Where a search came to an end, what stopped it, and what might help.
 
-Who calls says at which station it was: here the words begin with what stopped it.
+Who calls says at which station it was: here the words begin with what stopped it. The
+narrowest passage of the best way in need not be wide enough: a way of the tip is looked
+for that may come nearer to obstacles than the body does, and the opening where it comes
+nearest is measured in its middle. Nothing is proved.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import Reached
+from vdsm_pin.errors import OutOfTime, Reached
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.planner.feasibility import rail_distance
+from vdsm_pin.planner.fewest.elastic_band import resampled
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
+from vdsm_pin.planner.fewest.tip_cells import TipRoom
+from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.planner.time_limit import deadline_of
@@ -29,8 +36,23 @@ from vdsm_pin.planner.upper_clearance import (
 from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import at_most_mm, in_mm
 
+NEARER: Final = 0.6
+"""How much nearer than the body a way in may come, over the body's radius; [-]."""
+CELLS: Final = 60_000
+"""Cells at which the search for it ends."""
+WAY_STEP: Final = 0.02
+"""Distance of its points over the arm's length; [-]."""
+FINER: Final = 20
+"""Places between two of them at which it is measured."""
+TURNS: Final = 16
+"""Directions across the way that are tried."""
+FIRST: Final = 0.3
+"""The first step to the middle of an opening, over the body's radius; [-]."""
+SHORTER: Final = 0.9
+"""How much shorter each of them is than the one before; [-]."""
 AT_LIMIT: Final = 0.97
 """Part of the largest link angle from which on a joint counts as at its limit; [-]."""
 AT_END: Final = 1e-3
@@ -39,7 +61,7 @@ counts as there; [-]."""
 SNUG: Final = 1.15
 """An opening up to this many times what the body needs counts as the reason; [-]."""
 
-FINER: Final = 8
+ROW_PLACES: Final = 8
 """Places looked at for each row of the path."""
 AT_REACH: Final = 0.9995
 """Part of the arm's length from which on a path is too far from the rail; [-]."""
@@ -232,7 +254,7 @@ def on_the_path(
         OutOfTime: If the time of the clearance function is over.
     """
     problem = held_from(problem, TIP_ONLY)
-    arm, share = problem.manipulator, np.arange(FINER)[:, None, None] / FINER
+    arm, share = problem.manipulator, np.arange(ROW_PLACES)[:, None, None] / ROW_PLACES
     between = (1.0 - share) * tips[:-1] + share * tips[1:]
     places = np.concatenate([between.reshape(-1, 3), tips[-1:]])
     ends = np.stack([places, places], axis=1)
@@ -293,3 +315,73 @@ def _advice(
     if follower:
         tried.append(follower)
     return [*tried, "another start", "a longer time limit"]
+
+
+@dataclass(frozen=True)
+class Passage:
+    """The best way in, and where it is narrowest.
+
+    Args:
+        place: The middle of its narrowest opening, shape (3,); [m].
+        route: Of the tip, shape (k, 3); [m].
+    """
+
+    place: FloatArray
+    route: FloatArray
+
+
+def narrowest_passage(
+    problem: PlanningProblem, clearance: LinkClearance, tip: FloatArray
+) -> Passage | None:
+    """The best way in to a tip and the middle of its narrowest opening.
+
+    Args:
+        problem: Arm and scene.
+        clearance: The planner's own, as long as to look.
+        tip: Where the way ends, shape (3,); [m].
+
+    Returns:
+        None without obstacles, where there is no way, or the time is over.
+    """
+    if not problem.scene.obstacles:
+        return None
+    assert isinstance(clearance, BroadPhase)
+    exact = replace(clearance, floor=-np.inf)
+    arm = problem.manipulator
+    required = problem.required_clearance - NEARER * arm.most_radius
+    step = WAY_STEP * arm.total_length
+    space = TipSpace(problem, exact, required, step, CELLS)
+    try:
+        for route in space.routes(tip, 1):
+            points = resampled(route, step / FINER)
+            worst = int(np.argmin(space.room.spare(points)))
+            ends = points[[max(worst - 1, 0), min(worst + 1, len(points) - 1)]]
+            place = _middle(space.room, points[worst], ends[1] - ends[0])
+            return Passage(place, route)
+    except OutOfTime:
+        pass
+    return None
+
+
+def _middle(room: TipRoom, place: FloatArray, along: FloatArray) -> FloatArray:
+    """The narrowest place of an opening, in its middle, shape (3,); [m].
+
+    Steps along the way go where it is narrower, steps across where it is wider.
+
+    Args:
+        room: Measures.
+        place: In the opening, shape (3,); [m].
+        along: Which way it leads, shape (3,); [m].
+    """
+    if not along.any():
+        return place
+    step, turn = FIRST * room.arm.most_radius, np.arange(TURNS) * 2.0 * np.pi / TURNS
+    _, _, axes = np.linalg.svd(along[None])
+    across = np.column_stack([np.cos(turn), np.sin(turn)]) @ axes[1:]
+    ahead = np.stack([axes[0], -axes[0]])
+    while step > TOLERANCES.planned_clearance:
+        for sign, ways in ((-1.0, across), (1.0, ahead)):
+            tried = np.vstack([place, place + step * ways])
+            place = tried[int(np.argmin(sign * room.spare(tried)))]
+        step *= SHORTER
+    return place

@@ -25,8 +25,7 @@ from vdsm_pin.planner.fewest.elastic_band import (
     resampled,
     shortened,
 )
-from vdsm_pin.planner.fewest.tip_cells import TipCells
-from vdsm_pin.planner.fewest.tip_room import TipRoom
+from vdsm_pin.planner.fewest.tip_cells import TipCells, TipRoom
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.planner.tip_curve import own_curve
 from vdsm_pin.problem.planning_problem import PlanningProblem
