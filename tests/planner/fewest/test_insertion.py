@@ -24,7 +24,7 @@ from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest import elastic_band, insertion, tip_routes
 from vdsm_pin.planner.fewest.charts import coordinates
-from vdsm_pin.planner.fewest.elastic_band import QUICK, THOROUGH, resampled
+from vdsm_pin.planner.fewest.elastic_band import SHORT_PULL, LONG_PULL, resampled
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.judge import Judge
@@ -309,7 +309,7 @@ def test_a_longer_pull_comes_before_a_way_that_takes_long_to_find(
     monkeypatch.setattr(tip_routes, "is_followed", lambda *_: False)
     ways = list(space.routes(task.path.points[0], 3))
     assert len(ways) == 3
-    assert efforts == [QUICK, THOROUGH, QUICK]
+    assert efforts == [SHORT_PULL, LONG_PULL, SHORT_PULL]
     assert asked[1] < asked[0] == asked[2] == space.most
 
 
@@ -402,7 +402,7 @@ def test_a_way_is_never_pulled_through_a_wall(seed: int) -> None:
     round_ = [[near, 0, 0], [near, under, 0], [behind, under, 0], [behind, 0, 0]]
     route = resampled(np.vstack([START, round_, LOOP[:1]]), far / 3.0)
     assert blocked(space.room, route) == 0
-    for sizes in elastic_band.SIZES, elastic_band.FINER:
+    for sizes in elastic_band.SIZES, elastic_band.NARROW_SIZES:
         way = elastic_band.pulled(space.room, route, space.behind, sizes)
         assert blocked(space.room, way) == 0
 
@@ -555,13 +555,13 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
 def test_an_arm_that_gets_in_farther_on_draws_from_where_it_did_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    visited, places = insertion._Search._visit, list[int]()
+    visited, places = insertion._Visits._visit, list[int]()
 
-    def visit(self: insertion._Search, k: int) -> insertion._Visit | None:
+    def visit(self: insertion._Visits, k: int) -> insertion._Visit | None:
         places.append(k)
         return visited(self, k) if k == 2 else None
 
-    monkeypatch.setattr(insertion._Search, "_visit", visit)
+    monkeypatch.setattr(insertion._Visits, "_visit", visit)
     points = np.array([[1.5, 0.2, 0.0], [1.5, 0.4, 0.0]])
     task = problem(points=points, closed=False, start=START)
     rows = path_rows(task.path)

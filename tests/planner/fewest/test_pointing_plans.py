@@ -204,7 +204,7 @@ def test_the_second_way_in_ends_along_where_the_last_link_shall_look(
     rows = path_rows(task.path)
     route = tip_route(task, rows, np.zeros(len(rows.tips), np.bool_), 0.06, 0.0)
     level = Insert(population=10, routes=1, backtracks=2, seed=0, directed=True)
-    search = insertion._Search(judge, space, route, level)
+    search = insertion._Visits(judge, space, route, level)
     ways = list(search._routes(search.tips))
     aim = ASIDE[0] / np.linalg.norm(ASIDE[0])
     last = WELD[0] - np.linspace(0.0, ARM.link_lengths[-1], 5)[:, None] * aim

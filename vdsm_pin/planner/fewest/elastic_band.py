@@ -16,14 +16,14 @@ from vdsm_pin.planner.fewest.tip_cells import LEAST, NARROW, TipRoom
 from vdsm_pin.planner.spacing import spread
 from vdsm_pin.problem.pointing import angles_between
 
-QUICK: Final = (1, 3)
+SHORT_PULL: Final = (1, 3)
 """Times that a way is pulled from its beginning until an arm can follow it, and times
 that stretches of all widths are moved."""
-THOROUGH: Final = (3, 16)
+LONG_PULL: Final = (3, 16)
 """The same for ways that an arm has not followed."""
 LITTLE: Final = 0.25
 """What a way must become worth more for another time; [-]."""
-ENOUGH: Final = 4.0
+LITTLE_FOLLOWED: Final = 4.0
 """The same where an arm can follow it; [-]."""
 LEAST_GAIN: Final = 1e-4
 """What a move must be worth; [-]."""
@@ -32,7 +32,7 @@ SHIFTS: Final = 8
 SIZES: Final = (0.5, 0.2, 0.1)
 """How far they go, round after round, over the body's radius or over what bends the arm
 by `SWAY`; [-]."""
-FINER: Final = (0.05, 0.02, 0.01)
+NARROW_SIZES: Final = (0.05, 0.02, 0.01)
 """The same where it is narrow; [-]."""
 SWAY: Final = 0.4
 """Part of the largest link angle by which a move bends a way at most; [-]."""
@@ -74,7 +74,7 @@ def refined(
     room: TipRoom,
     route: FloatArray,
     behind: FloatArray,
-    effort: tuple[int, int] = QUICK,
+    effort: tuple[int, int] = SHORT_PULL,
 ) -> FloatArray:
     """A way with points so close, where it is narrow, that an arm can follow it.
 
@@ -95,7 +95,7 @@ def refined(
     at, share = spread(counts)
     part = share[:, None]
     route = (1.0 - part) * route[at] + part * route[at + 1]
-    return pulled(room, route, behind, FINER, effort)
+    return pulled(room, route, behind, NARROW_SIZES, effort)
 
 
 def pulled(
@@ -103,7 +103,7 @@ def pulled(
     route: FloatArray,
     behind: FloatArray,
     sizes: tuple[float, ...] = SIZES,
-    effort: tuple[int, int] = QUICK,
+    effort: tuple[int, int] = SHORT_PULL,
 ) -> FloatArray:
     """A way straightened, and in the middle where it is narrow (elastic band).
 
@@ -115,7 +115,7 @@ def pulled(
         route: Shape (k, 3), its ends stay; [m].
         behind: What the arm lies on behind the way, from its end on, shape (b, 3); [m].
         sizes: How far stretches are moved, see `SIZES`; [-].
-        effort: `QUICK` or `THOROUGH`.
+        effort: `SHORT_PULL` or `LONG_PULL`.
     """
     if len(route) < 3:
         return route
@@ -124,12 +124,12 @@ def pulled(
     widths = [widest >> k for k in range(widest.bit_length() + 1)]
     own = best = _Way(route, *band.worth(route[None]))
     tries, passes = effort
-    for _ in range(0 if sizes is FINER and own.sound else tries):
+    for _ in range(0 if sizes is NARROW_SIZES and own.sound else tries):
         way, before = own, -np.inf
         for _ in range(passes):
             for width, size in itertools.product(widths, sizes):
                 way = band.moved(way, width, size, rng)
-            if way.total < before + (ENOUGH if way.sound else LITTLE):
+            if way.total < before + (LITTLE_FOLLOWED if way.sound else LITTLE):
                 break
             before = way.total
         best = way if way.total > best.total else best

@@ -27,7 +27,7 @@ OFFSPRING: Final = 8
 """Children tried for each parent."""
 MUTATIONS: Final = 4
 """Times a population that dwindles is mutated at rest before it goes back."""
-ENOUGH: Final = 0.5
+MOST_SCORED: Final = 0.5
 """Clearance beyond this part of the body's radius scores no better; [-]."""
 UNCHANGED: Final = 0.3
 """Part of the children that follow the leader that are not mutated besides; [-]."""
@@ -293,7 +293,7 @@ class Population:
 
     def _clearance_cost(self, clearances: FloatArray) -> FloatArray:
         """What clearances [m] lack of what is wanted, 0 for nothing, 1 for all."""
-        wanted = ENOUGH * self.arm.most_radius
+        wanted = MOST_SCORED * self.arm.most_radius
         return np.maximum(0.0, 1.0 - (clearances - self.judge.required) / wanted)
 
     def _selected(self, score: FloatArray) -> IntArray:

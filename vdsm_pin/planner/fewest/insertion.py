@@ -34,7 +34,7 @@ from vdsm_pin.units import in_mm
 
 TIP_TOLERANCE: Final = 0.3
 """How far the tip may be from its way off the path, over the body's radius; [-]."""
-AHEAD: Final = (3, 8, 20)
+LATER_LAYERS: Final = (3, 8, 20)
 """Layers ahead of a place of the path by way of which it is come to."""
 TURNING: Final = 12
 """Layers before the path from which on the arm turns to where it shall look there."""
@@ -107,11 +107,11 @@ def insert(
     """
     step = level.step * judge.problem.manipulator.total_length
     route = tip_route(judge.problem, rows, undrawable, step, 0.0)
-    search = _Search(judge, space, route, level)
+    search = _Visits(judge, space, route, level)
     return Inserted(search.found(soon), search.stuck())
 
 
-class _Search:
+class _Visits:
     """The visits of one route."""
 
     def __init__(
@@ -270,7 +270,7 @@ class _Search:
         if len(self.back) > 1:
             for route in self.outside.routes(path[0], 1):
                 yield np.vstack([self.back, route[1:]])
-        for ahead in AHEAD:
+        for ahead in LATER_LAYERS:
             if ahead < len(path):
                 for route in self.space.routes(path[ahead], 1):
                     yield np.vstack([route, path[ahead - 1 :: -1]])

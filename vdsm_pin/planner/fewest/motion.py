@@ -28,7 +28,7 @@ from vdsm_pin.tolerances import TOLERANCES
 MOST_MORE, SOME_MORE = 20, 100_000
 """Rows at which adding rows ends: so many for each that the spacing asks for, and so
 many besides."""
-ROUNDS: Final = 12
+ROW_ROUNDS: Final = 12
 """Rounds of adding rows; each at least reaches what it aims at in smooth stretches."""
 
 
@@ -242,7 +242,7 @@ def dense_rows(
     asked = counts = np.maximum(1, count_of(travel / spacing))
     most = MOST_MORE * int(counts.sum()) + SOME_MORE
     excess = np.full(len(counts), np.inf)
-    for _ in range(ROUNDS):
+    for _ in range(ROW_ROUNDS):
         if counts.sum() > most:
             break
         rows = rows_at(manipulator, corners, *spread(counts))
@@ -255,7 +255,7 @@ def dense_rows(
         counts = np.where(excess > 1.0, np.maximum(more, counts + 1), counts)
     # Near a stretched arm angles go with the root of the way: rows crowd at its end.
     rows = rows_at(manipulator, corners, *spread(np.where(excess > 1.0, asked, counts)))
-    for _ in range(ROUNDS):
+    for _ in range(ROW_ROUNDS):
         each = _excess(manipulator, corners, rows, (spacing, turn, stray))
         if (each <= 1.0).all():
             return rows

@@ -15,7 +15,7 @@ from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
-CUTS: Final = 14
+HALVINGS: Final = 14
 """Times an interval is halved; what is not known to be apart then counts as too near.
 """
 FINE: Final = 0.1
@@ -102,7 +102,7 @@ class OwnClearance:
         begin, end = (self._at(centres[number]) for centres in ends)
         starts = self._starts(ends[0]) | self._starts(ends[1])
         least = -self.lacked * starts[:, None] - TOLERANCES.on_boundary
-        for _ in range(CUTS):
+        for _ in range(HALVINGS):
             need = least[number]
             near = ((begin.spare < need) | (end.spare < need)).any(axis=1)
             kept[number[near]] = False

@@ -33,7 +33,7 @@ WEIGHTS = Weights(
     turn=0.048, still=0.0032, more=0.04, visit=0.96, connection=0.05, skip=1000.0
 )
 """Costs in arm lengths drawn with one changed angle more."""
-REST = 0.0032
+ONE_POINT = 0.0032
 """Length over the arm's that drawing a single point counts for; [-]."""
 DISTRUST = 0.016
 """Length over the arm's added, with the distance, to a way between two tips that was
@@ -85,7 +85,7 @@ class SequenceSearch:
         route = roadmap.route
         self.gap = np.concatenate([[0.0], np.diff(route.stations) / length])
         # Resting at a single point costs like a stretch, or it would be left out.
-        self.gap[1:][self.gap[1:] == 0.0] = REST
+        self.gap[1:][self.gap[1:] == 0.0] = ONE_POINT
         self.gaps = route.gaps / length
         self.connection_gaps = self.gaps.copy()
         self.from_start, self.before = self.lengths_from(start_node)

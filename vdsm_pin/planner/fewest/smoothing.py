@@ -21,7 +21,7 @@ from vdsm_pin.planner.fewest.motion import Corners, is_directed, standing
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.tolerances import TOLERANCES
 
-REST: Final = 3e-4
+RESTING: Final = 3e-4
 """Length over the arm's that a change of shape counts for while the tip rests; [-]."""
 
 
@@ -153,7 +153,7 @@ def _round(
     new.bent[picked] = bends > TOLERANCES.changed_angle
     new.largest[picked] = bends.max(axis=1)
     lengths = np.abs(np.diff(corners.stations))
-    lengths += REST * judge.problem.manipulator.total_length
+    lengths += RESTING * judge.problem.manipulator.total_length
     need, bend = _guards(judge, corners, state, weights, spans)
     good, new.clearances[picked] = judge.measured(
         judge.lines(trial, picked), need, bend
@@ -278,7 +278,7 @@ def _stepped_back(corners: Corners, begin: int, end: int, depth: float) -> Corne
     return corners.rerouted(begin, end, new_tips, new_shapes)
 
 
-ROUNDS: Final = 4
+JOINT_ROUNDS: Final = 4
 """Rounds over all joints."""
 WAYS: Final = (-1, 1, 0)
 """How a joint is made straight, in this order, see `in_line`."""
@@ -334,7 +334,7 @@ def mean_knees(judge: Judge, corners: Corners) -> float:
 def _in_order(judge: Judge, motion: _Bent, joints: range) -> _Bent:
     """The motion with joints made straight in an order, until none can be."""
     steps, vain, fewest = [*itertools.product(joints, WAYS)], 0, motion.knees
-    for joint, way in ROUNDS * steps:
+    for joint, way in JOINT_ROUNDS * steps:
         try:
             corners = _without(judge, motion, joint, way)
         except OutOfTime:

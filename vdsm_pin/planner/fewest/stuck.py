@@ -45,11 +45,11 @@ CELLS: Final = 60_000
 """Cells at which the search for it ends."""
 WAY_STEP: Final = 0.02
 """Distance of its points over the arm's length; [-]."""
-FINER: Final = 20
+WAY_PLACES: Final = 20
 """Places between two of them at which it is measured."""
-TURNS: Final = 16
+ACROSS: Final = 16
 """Directions across the way that are tried."""
-FIRST: Final = 0.3
+FIRST_STEP: Final = 0.3
 """The first step to the middle of an opening, over the body's radius; [-]."""
 SHORTER: Final = 0.9
 """How much shorter each of them is than the one before; [-]."""
@@ -353,7 +353,7 @@ def narrowest_passage(
     space = TipSpace(problem, exact, required, step, CELLS)
     try:
         for route in space.routes(tip, 1):
-            points = resampled(route, step / FINER)
+            points = resampled(route, step / WAY_PLACES)
             worst = int(np.argmin(space.room.spare(points)))
             ends = points[[max(worst - 1, 0), min(worst + 1, len(points) - 1)]]
             place = _middle(space.room, points[worst], ends[1] - ends[0])
@@ -375,7 +375,8 @@ def _middle(room: TipRoom, place: FloatArray, along: FloatArray) -> FloatArray:
     """
     if not along.any():
         return place
-    step, turn = FIRST * room.arm.most_radius, np.arange(TURNS) * 2.0 * np.pi / TURNS
+    step = FIRST_STEP * room.arm.most_radius
+    turn = np.arange(ACROSS) * 2.0 * np.pi / ACROSS
     _, _, axes = np.linalg.svd(along[None])
     across = np.column_stack([np.cos(turn), np.sin(turn)]) @ axes[1:]
     ahead = np.stack([axes[0], -axes[0]])

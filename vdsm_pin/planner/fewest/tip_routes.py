@@ -17,8 +17,8 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.elastic_band import (
-    QUICK,
-    THOROUGH,
+    SHORT_PULL,
+    LONG_PULL,
     is_followed,
     pulled,
     refined,
@@ -136,12 +136,12 @@ class TipSpace:
         shortest = False
         while route is not None:
             short = resampled(shortened(self.room, route), self.spacing)
-            way = self._pulled(short, QUICK)
+            way = self._pulled(short, SHORT_PULL)
             stuck = len(self.stuck)
             yield way
             # A longer pull comes after another way.
             if before:
-                yield self._pulled(before.pop(), THOROUGH)
+                yield self._pulled(before.pop(), LONG_PULL)
             if not is_followed(self.room, way, self.behind):
                 before.append(short)
             if len(self.stuck) == stuck:
@@ -152,11 +152,11 @@ class TipSpace:
             few = min(LONGER * cells.codes.size, self.most)
             route = cells.cheapest(start, goal, few, shortest)
             if route is None and before:
-                yield self._pulled(before.pop(), THOROUGH)
+                yield self._pulled(before.pop(), LONG_PULL)
             if route is None:
                 route = cells.cheapest(start, goal, self.most, shortest)
         for short in before:
-            yield self._pulled(short, THOROUGH)
+            yield self._pulled(short, LONG_PULL)
 
     def _pulled(self, short: FloatArray, effort: tuple[int, int]) -> FloatArray:
         """A way pulled to the middle of openings, and refined there."""

@@ -22,11 +22,11 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 
-AHEAD: Final = 0.15
+ADVANCE: Final = 0.15
 """A link leans ahead if it advances along the rail by so much of its length; [-]."""
 PARTS: Final = (0.75, 0.5, 0.25, 0.0)
 """Parts of the angles that may be left; [-]."""
-SHIFTS: Final = (1.0, 0.5, 0.0, 1.5)
+TAKEN_BACK: Final = (1.0, 0.5, 0.0, 1.5)
 """Parts of the tip's advance that the base takes back; [-]."""
 TRIES: Final = 200
 """Ways over a configuration drawn by chance."""
@@ -43,13 +43,13 @@ def leans_ahead(problem: PlanningProblem) -> bool:
 
 def _ahead(arm: Manipulator, joints: FloatArray) -> bool:
     advance = np.diff(row_centres(arm, joints[None])[0, :, 0])
-    return bool((advance >= AHEAD * arm.link_lengths).all())
+    return bool((advance >= ADVANCE * arm.link_lengths).all())
 
 
 def _targets(arm: Manipulator, start: FloatArray) -> Iterator[FloatArray]:
     """Joint values to move to, the nearest first."""
     tip_x = float(row_centres(arm, start[None])[0, -1, 0])
-    for part, shift in itertools.product(PARTS, SHIFTS):
+    for part, shift in itertools.product(PARTS, TAKEN_BACK):
         joints = part * start
         joints[0] = start[0]
         advance = float(row_centres(arm, joints[None])[0, -1, 0]) - tip_x
