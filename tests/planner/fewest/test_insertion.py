@@ -24,7 +24,7 @@ from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest import elastic_band, insertion, tip_routes
 from vdsm_pin.planner.fewest.charts import coordinates
-from vdsm_pin.planner.fewest.elastic_band import SHORT_PULL, LONG_PULL, resampled
+from vdsm_pin.planner.fewest.elastic_band import LONG_PULL, SHORT_PULL, resampled
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.judge import Judge
@@ -537,11 +537,11 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     judge, rows = judge_of(task), path_rows(task.path)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
     effort = Insert(population=24, routes=2, backtracks=3, seed=0)
-    found = insert(judge, space_of(task), rows, closed, effort).found
+    found = insert(judge, space_of(task), rows, closed, effort)[0]
     assert found is not None
     # Late, one visit is enough, but not none.
     late = Deadline(1.0, 0.0)
-    soon = insert(judge, space_of(task), rows, closed, effort, late).found
+    soon = insert(judge, space_of(task), rows, closed, effort, late)[0]
     assert soon is not None
     assert found.missing <= soon.missing < task.path.length
     assert judge.clear(found.corners.pick(np.arange(len(found.corners.drawn)))).all()
@@ -567,7 +567,7 @@ def test_an_arm_that_gets_in_farther_on_draws_from_where_it_did_not(
     rows = path_rows(task.path)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
     effort = Insert(population=4, routes=1, backtracks=1, seed=0)
-    found = insert(judge_of(task), space_of(task), rows, closed, effort).found
+    found = insert(judge_of(task), space_of(task), rows, closed, effort)[0]
     assert found is not None
     assert places == [0, 1, 2]
     assert not found.skipped
@@ -639,7 +639,7 @@ def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
     judge, rows = judge_of(task), path_rows(task.path)
     effort = Insert(population=10, routes=1, backtracks=2, seed=0, directed=True)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
-    found = insert(judge, space_of(task), rows, closed, effort).found
+    found = insert(judge, space_of(task), rows, closed, effort)[0]
     assert found is not None
     assert not found.missing > 0.0
     fewer = sparser(judge, found.corners)

@@ -18,7 +18,6 @@ from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.planner.fewest import explore
 from vdsm_pin.planner.fewest.added_nodes import checked_start, with_start
-from vdsm_pin.planner.fewest.insertion import Inserted
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap
@@ -172,7 +171,7 @@ def test_a_start_that_is_left_by_a_finer_search_alone_is_left(
     assert plan.trajectory.on_path.any()
     assert len(tried) == 2
     needed = 1000
-    monkeypatch.setattr(explore, "insert", lambda *_: Inserted(None, None))
+    monkeypatch.setattr(explore, "insert", lambda *_: (None, None))
     with pytest.raises(NoWayOut, match="out of the start"):
         plan_fewest(task, link_clearance(task), 0.0)
 

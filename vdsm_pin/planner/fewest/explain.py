@@ -90,12 +90,8 @@ def refuse(problem: PlanningProblem, outcome: Explored) -> None:
 
 def _drawn(problem: PlanningProblem, outcome: Explored) -> float:
     """Length of the path that the motion found draws; [m]."""
-    if outcome.found is None:
-        return 0.0
-    stations = outcome.found.route.stations
-    skipped = outcome.found.skipped
-    undrawn = sum(float(stations[k] - stations[k - 1]) for k in skipped)
-    return problem.path.length - undrawn
+    found = outcome.found
+    return 0.0 if found is None else problem.path.length - found.not_drawn
 
 
 def _proved(problem: PlanningProblem, outcome: Explored) -> Infeasible:

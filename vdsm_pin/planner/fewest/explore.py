@@ -405,8 +405,8 @@ def _once_inserted(
     before: Explored, space: TipSpace, level: Insert, soon: Deadline
 ) -> Explored:
     undrawable = before.proof.undrawable
-    now = insert(before.judge, space, before.rows, undrawable, level, soon)
-    return replace(before, found=now.found, stuck=now.stuck or before.stuck)
+    found, stuck = insert(before.judge, space, before.rows, undrawable, level, soon)
+    return replace(before, found=found, stuck=stuck or before.stuck)
 
 
 Proving: TypeAlias = Callable[[BroadPhase, Explored, TipSpace | None], Explored]

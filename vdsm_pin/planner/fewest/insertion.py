@@ -71,19 +71,6 @@ class _Visit:
         return self.first + drawn if drawn >= 0 else -1
 
 
-@dataclass(frozen=True)
-class Inserted:
-    """What an insertion came to.
-
-    Args:
-        found: The motion, None if nothing is drawn.
-        stuck: The visit that came farthest, None if there is no way for the tip.
-    """
-
-    found: Found | None
-    stuck: Stuck | None
-
-
 def insert(
     judge: Judge,
     space: TipSpace,
@@ -91,7 +78,7 @@ def insert(
     undrawable: BoolArray,
     level: Insert,
     soon: Deadline = NO_LIMIT,
-) -> Inserted:
+) -> tuple[Found | None, Stuck | None]:
     """A motion that draws what it can, going in as often as it takes.
 
     Args:
@@ -102,13 +89,17 @@ def insert(
         level: How thoroughly to look.
         soon: From when on what is not drawn yet is skipped, if something is drawn.
 
+    Returns:
+        The motion, None if nothing is drawn, and where the visit that came farthest
+        ended, None if there is no way for the tip.
+
     Raises:
         LimitExceeded: If the start breaks a limit.
     """
     step = level.step * judge.problem.manipulator.total_length
     route = tip_route(judge.problem, rows, undrawable, step, 0.0)
     search = _Visits(judge, space, route, level)
-    return Inserted(search.found(soon), search.stuck())
+    return search.found(soon), search.stuck()
 
 
 class _Visits:

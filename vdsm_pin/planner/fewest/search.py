@@ -8,6 +8,7 @@ otherwise.
 """
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -294,10 +295,17 @@ class Found:
     @property
     def missing(self) -> float:
         """Length of the path not drawn and not proved impossible to draw; [m]."""
+        return self._length([k for k in self.skipped if not self.route.undrawable[k]])
+
+    @property
+    def not_drawn(self) -> float:
+        """Length of the path not drawn; [m]."""
+        return self._length(self.skipped)
+
+    def _length(self, layers: Iterable[int]) -> float:
+        """Length of the stretches that end at some layers; [m]."""
         gaps = np.diff(self.route.stations)
-        return float(
-            sum(gaps[k - 1] for k in self.skipped if not self.route.undrawable[k])
-        )
+        return float(sum(gaps[k - 1] for k in layers))
 
 
 @dataclass(frozen=True)

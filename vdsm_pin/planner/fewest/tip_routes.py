@@ -17,8 +17,8 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.elastic_band import (
-    SHORT_PULL,
     LONG_PULL,
+    SHORT_PULL,
     is_followed,
     pulled,
     refined,

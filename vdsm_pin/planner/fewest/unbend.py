@@ -30,7 +30,6 @@ TAKEN_BACK: Final = (1.0, 0.5, 0.0, 1.5)
 """Parts of the tip's advance that the base takes back; [-]."""
 TRIES: Final = 200
 """Ways over a configuration drawn by chance."""
-SEED: Final = 0
 STRAY: Final = 0.3
 """How far these are from the line; the base goes by thirds of the arm; [rad]."""
 
@@ -92,7 +91,7 @@ def unbend(
         rows = clear_line(problem, clearance, start, target, need)
         if rows is not None:
             return rows
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(0)
     spread = np.full(start.shape, STRAY)
     spread[0] *= arm.total_length / 3.0
     for _ in range(TRIES):
