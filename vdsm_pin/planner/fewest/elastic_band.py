@@ -6,6 +6,7 @@ are tried by chance. Nothing is proved here.
 """
 
 import itertools
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -122,7 +123,7 @@ def pulled(
     rng, band = np.random.default_rng(len(route)), _Band(room, behind)
     widest = len(route) // 2 if sizes is SIZES else 2
     widths = [widest >> k for k in range(widest.bit_length() + 1)]
-    own = best = _Way(route, *band.worth(route[None]))
+    own = best = band.way(route)
     tries, passes = effort
     for _ in range(0 if sizes is NARROW_SIZES and own.sound else tries):
         way, before = own, -np.inf
@@ -140,7 +141,21 @@ def pulled(
 
 def is_followed(room: TipRoom, route: FloatArray, behind: FloatArray) -> bool:
     """Whether an arm can follow a way, see `pulled`."""
-    return _Way(route, *_Band(room, behind).worth(route[None])).sound
+    return _Band(room, behind).way(route).sound
+
+
+class _Lines(NamedTuple):
+    """Lines measured, one for each place of a way or of each of several ways.
+
+    Args:
+        begins: Shape (..., k, 3); [m].
+        ends: Shape (..., k, 3); [m].
+        spare: Room over what is worth having, from `DEEPEST` to 1, shape (..., k); [-].
+    """
+
+    begins: FloatArray
+    ends: FloatArray
+    spare: FloatArray
 
 
 class _Way(NamedTuple):
@@ -151,12 +166,14 @@ class _Way(NamedTuple):
         worth: At each point, shape (1, n); [-].
         blocked: Whether it is blocked between its points, shape (1, n - 1).
         kept: Whether an arm can lie on it at each point, shape (1, n).
+        measured: Its lines, the chords to its points and from them, shape (1, k) each.
     """
 
     points: FloatArray
     worth: FloatArray
     blocked: BoolArray
     kept: BoolArray
+    measured: tuple[_Lines, ...]
 
     @property
     def total(self) -> float:
@@ -212,7 +229,7 @@ class _Band:
         towards = bump[:, None] * ((before + ahead) / 2.0 - route)
         others = [route + 0.5 * towards, route + towards, route]
         tried = np.concatenate([tried, others])
-        worth, blocked, _ = self.worth(tried)
+        worth, blocked, *_ = self._worth(tried, way.measured)
         better, shut = worth - worth[-1], blocked & ~way.blocked
         better[:, 1:] = np.where(shut, -np.inf, better[:, 1:])
         better[:, :-1] = np.where(shut, -np.inf, better[:, :-1])
@@ -222,7 +239,7 @@ class _Band:
         good = (gain.max(axis=0) > LEAST_GAIN)[number]
         for chosen in (good, good & (owner % 2 == 0), good & (owner % 2 == 1)):
             new = np.where(chosen[:, None], tried[best[number], np.arange(n)], route)
-            now = _Way(new, *self.worth(new[None]))
+            now = self.way(new, way)
             if not (now.blocked & ~way.blocked).any() and now.total > way.total:
                 return now
         return way
@@ -232,15 +249,23 @@ class _Band:
         bent = SWAY * self.arm.max_link_angle * half**2 / self.link
         return max(self.arm.most_radius, min(bent, half))
 
-    def worth(self, routes: FloatArray) -> tuple[FloatArray, BoolArray, BoolArray]:
-        """What `_Way` has of ways, shape (c, n, 3).
+    def way(self, points: FloatArray, before: _Way | None = None) -> _Way:
+        """A way, shape (n, 3), and what it is worth; before it is one much like it."""
+        known = (None,) * 3 if before is None else before.measured
+        return _Way(points, *self._worth(points[None], known))
+
+    def _worth(
+        self, routes: FloatArray, known: Sequence[_Lines | None]
+    ) -> tuple[FloatArray, BoolArray, BoolArray, tuple[_Lines, ...]]:
+        """What `_Way` has of ways, shape (c, n, 3), the last one much like a known one.
 
         An arm that follows a way lays its links as chords on it, which bow to the
         inside of a bend: a place is the better the more room the chords have that end
         there, and the less one turns against the other.
         """
         count, n = routes.shape[:2]
-        lines = self._spare(routes[:, :-1], routes[:, 1:])
+        along = self._measured(routes[:, :-1], routes[:, 1:], known[0])
+        lines = along.spare
         wide = np.ones((count, n))
         wide[:, 1:] = np.minimum(wide[:, 1:], lines)
         wide[:, :-1] = np.minimum(wide[:, :-1], lines)
@@ -248,7 +273,9 @@ class _Band:
         every, k = np.concatenate([head, routes], axis=1), len(self.behind)
         back, ahead = _chords(self.arm, every[-1], np.arange(k, k + n))
         own, first, last = routes, every[:, back], every[:, ahead]
-        chords = np.minimum(self._spare(first, own), self._spare(own, last))
+        before = self._measured(first, own, known[1])
+        after = self._measured(own, last, known[2])
+        chords = np.minimum(before.spare, after.spare)
         turn = angles_between(own - first, last - own) / self.arm.max_link_angle
         # At the end nothing is ahead.
         steep = np.where(turn > STEEP, turn - STEEP, 0.0)
@@ -261,17 +288,22 @@ class _Band:
         worth = ROOM * worth - STEEP_COST * steep**2
         worth[:, :-1] -= off
         kept = ~(turn > STEEPEST) & (chords >= 0.0)
-        return worth, lines < 0.0, kept
+        return worth, lines < 0.0, kept, (along, before, after)
 
-    def _spare(self, begins: FloatArray, ends: FloatArray) -> FloatArray:
-        """Room on lines over what is worth having, from `DEEPEST` to 1; [-]."""
-        # Most ways are the last one but for some stretches.
-        own = (begins != begins[-1]).any(axis=2) | (ends != ends[-1]).any(axis=2)
-        own[-1] = True
-        spare = np.zeros(own.shape)
-        spare[own] = self.room.spare(begins[own], ends[own])
-        spare = np.where(own, spare, spare[-1])
-        return np.clip(spare / self.wanted, DEEPEST, 1.0)
+    def _measured(
+        self, begins: FloatArray, ends: FloatArray, known: _Lines | None
+    ) -> _Lines:
+        """Lines of ways, shape (c, k, 3) each; those that are known not once more."""
+        spare = np.zeros(begins.shape[:2])
+        fresh = np.ones(spare.shape, dtype=np.bool_)
+        if known is not None:
+            spare[:] = known.spare
+            fresh = (begins != known.begins).any(axis=2)
+            fresh |= (ends != known.ends).any(axis=2)
+        if fresh.any():
+            room = self.room.spare(begins[fresh], ends[fresh])
+            spare[fresh] = np.clip(room / self.wanted, DEEPEST, 1.0)
+        return _Lines(begins, ends, spare)
 
 
 def _chords(
