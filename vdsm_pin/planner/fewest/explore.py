@@ -29,7 +29,7 @@ from vdsm_pin.planner.fewest.levels import (
     Search,
     confined_first,
 )
-from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
+from vdsm_pin.planner.fewest.roadmap import CostWeights, build_roadmap
 from vdsm_pin.planner.fewest.route import tip_route
 from vdsm_pin.planner.fewest.search import Found, Searched, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
@@ -472,31 +472,13 @@ def _look(
         if found is None or not found.missing > 0.0:
             break
         skipped = tuple(k for k in found.skipped if not route.undrawable[k])
-        if back == 0.0 and _unreached(found):
+        if back == 0.0 and found.bars_ways:
             break
         more = fill(judge, found.roadmap, found.lengths, skipped, rng, weights)
         if more is None:
             break
-        again = search(judge, more, _same_node(found, more), level.rounds)
+        again = search(judge, more, found.start_in(more), level.rounds)
         if again is None or not again.missing < found.missing:
             break
         found = again
     return found, room
-
-
-def _unreached(found: Searched) -> bool:
-    """Whether there are nodes in the stretches not drawn that no way leads to."""
-    roadmap = found.roadmap
-    for k in found.skipped:
-        if roadmap.route.undrawable[k]:
-            continue
-        tip = roadmap.route.layers[k]
-        if not np.isfinite(found.lengths[roadmap.nodes_at(tip)]).all():
-            return True
-    return False
-
-
-def _same_node(found: Searched, more: Roadmap) -> int:
-    """The number of the start node in an extended roadmap."""
-    node, before = np.array(found.start_node), found.roadmap
-    return int(more.nodes_of(before.tips_of(node), before.shapes_of(node)))

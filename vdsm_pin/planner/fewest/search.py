@@ -323,6 +323,19 @@ class Searched(Found):
     start_node: int
     lengths: FloatArray
 
+    @property
+    def bars_ways(self) -> bool:
+        """Whether nodes stand in the stretches not drawn that no way leads to."""
+        route = self.roadmap.route
+        tips = [route.layers[k] for k in self.skipped if not route.undrawable[k]]
+        ways = [self.lengths[self.roadmap.nodes_at(tip)] for tip in tips]
+        return not all(np.isfinite(lengths).all() for lengths in ways)
+
+    def start_in(self, more: Roadmap) -> int:
+        """The number of the start node in an extended roadmap."""
+        node, before = np.array(self.start_node), self.roadmap
+        return int(more.nodes_of(before.tips_of(node), before.shapes_of(node)))
+
 
 def search(
     judge: Judge, roadmap: Roadmap, start_node: int, rounds: int
