@@ -16,8 +16,11 @@ from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.interval_parts import bow_bounds
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows, standing
-from vdsm_pin.planner.fewest.offset_kernels import mutated_offsets
-from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
+from vdsm_pin.planner.fewest.offset_kernels import (
+    bends_of,
+    clearances_along,
+    mutated_offsets,
+)
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, build_roadmap
 from vdsm_pin.planner.fewest.roadmap_kernels import _drawing, _resting
 from vdsm_pin.planner.fewest.route import tip_route

@@ -12,7 +12,7 @@ import numpy as np
 
 from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.planner.fewest.pose_kernels import Lines
+from vdsm_pin.planner.fewest.offset_kernels import Lines
 from vdsm_pin.tolerances import TOLERANCES
 
 ROUNDS = 30

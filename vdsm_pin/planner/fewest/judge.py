@@ -18,8 +18,8 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.broad_phase import BroadPhase, cuts_of
 from vdsm_pin.planner.fewest.interval_parts import LONG_TRAVEL, Parts, parts_of_pieces
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
+from vdsm_pin.planner.fewest.offset_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.fewest.own_clearance import OwnClearance
-from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import ANYWHERE, AimError, LastLinkCone

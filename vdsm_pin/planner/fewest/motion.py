@@ -21,7 +21,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.direction_kernels import placed_between
-from vdsm_pin.planner.fewest.pose_kernels import Lines, centres_between, knees_between
+from vdsm_pin.planner.fewest.offset_kernels import Lines, centres_between, knees_between
 from vdsm_pin.planner.spacing import STRAYS, count_of, row_steps, spread
 from vdsm_pin.tolerances import TOLERANCES
 

@@ -9,7 +9,7 @@ from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.explore import Explored
 from vdsm_pin.planner.fewest.motion import Corners
-from vdsm_pin.planner.fewest.pose_kernels import bends_of
+from vdsm_pin.planner.fewest.offset_kernels import bends_of
 from vdsm_pin.planner.impossible.bounds import least_changed
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.upper_clearance import TIP_ONLY, held_from, upper_clearance

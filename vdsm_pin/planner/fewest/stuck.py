@@ -17,7 +17,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.elastic_band import resampled
-from vdsm_pin.planner.fewest.pose_kernels import bends_of
+from vdsm_pin.planner.fewest.offset_kernels import bends_of
 from vdsm_pin.planner.fewest.tip_cells import TipRoom
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.records import LinkClearance
