@@ -11,11 +11,11 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
 from vdsm_pin.planner.broad_phase import broad_phase
-from vdsm_pin.planner.fewest.charts import coordinates
+from vdsm_pin.planner.fewest.charts import DIRECTIONS, Intervals, standing
 from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.interval_parts import bow_bounds
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows, standing
+from vdsm_pin.planner.fewest.motion import Corners, dense_rows
 from vdsm_pin.planner.fewest.offset_kernels import (
     bends_of,
     clearances_along,
@@ -189,7 +189,7 @@ def test_no_interval_is_clear_that_bends_too_far_between_its_ends() -> None:
     theta = -np.arcsin(np.sin(psi) * np.sin(around)).reshape(-1, 8)
     alpha = np.arctan2(np.sin(psi) * np.cos(around), np.cos(psi)).reshape(-1, 8)
     centres = joint_centres(fixed, np.zeros(2 * count), alpha, theta)
-    axes = coordinates(fixed, centres, directed=True).reshape(count, 2, 8, 3)
+    axes = DIRECTIONS.coordinates(fixed, centres).reshape(count, 2, 8, 3)
     tips = centres[:, -1].reshape(count, 2, 3)
     lines = Intervals(tips[:, 0], tips[:, 1], axes[:, 0], axes[:, 1])
     places, number = np.linspace(0.0, 1.0, 401), np.arange(count)

@@ -23,13 +23,13 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.broad_phase import broad_phase
 from vdsm_pin.planner.fewest import elastic_band, insertion, tip_routes
-from vdsm_pin.planner.fewest.charts import coordinates
+from vdsm_pin.planner.fewest.charts import DIRECTIONS, OFFSETS, Intervals, standing
 from vdsm_pin.planner.fewest.elastic_band import LONG_PULL, SHORT_PULL, resampled
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
-from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
+from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.smoothing import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.tip_cells import TipCells, TipRoom
@@ -621,7 +621,7 @@ def test_between_directions_the_arm_moves_steadily(
     here = joint_centres(arm, x0[0], alpha, theta)
     there = joint_centres(arm, x0[1], alpha + turns[0], theta + turns[1])
     tips = here[:, -1].copy(), there[:, -1].copy()
-    ends, steps = (coordinates(arm, one, directed=True) for one in (here, there)), []
+    ends, steps = (DIRECTIONS.coordinates(arm, one) for one in (here, there)), []
     lines = Intervals(*tips, *ends)
     for parts in (200, 400):
         share = np.tile(np.linspace(0.0, 1.0, parts + 1), 200)
@@ -662,7 +662,7 @@ def test_knees_of_an_arm_whose_base_is_fixed_are_taken_away(drawn: bool) -> None
     alpha, theta = size * np.full(8, 0.2), size * np.linspace(-0.1, 0.2, 8)
     centres = joint_centres(arm, np.zeros(5), alpha, theta)
     corners = Corners(
-        centres[:, -1], coordinates(arm, centres, directed=True), np.arange(5.0),
+        centres[:, -1], DIRECTIONS.coordinates(arm, centres), np.arange(5.0),
         np.full(4, drawn),
     )  # fmt: skip
     judge = judge_of(task)
@@ -703,7 +703,7 @@ def test_directions_and_projections_place_the_same_arms() -> None:
     centres[:, :, 1:] -= centres[:, :1, 1:]
     tips, number, still = centres[:, -1].copy(), np.arange(100), np.zeros(100)
     for directed in (False, True):
-        shapes = coordinates(ARM, centres, directed)
+        shapes = (DIRECTIONS if directed else OFFSETS).coordinates(ARM, centres)
         placed = Intervals(tips, tips, shapes, shapes).centres(ARM, number, still)
         np.testing.assert_allclose(placed, centres, atol=1e-12)
 
@@ -718,7 +718,7 @@ def test_between_directions_tip_links_and_rail_are_exact(
     here = joint_centres(ARM, np.full(200, rail[0]), alpha, theta)
     turns = rng.uniform(-0.1, 0.1, (2, 200, ARM.n_links))
     there = joint_centres(ARM, np.full(200, rail[1]), alpha + turns[0], theta)
-    ends = [coordinates(ARM, one, directed=True) for one in (here, there)]
+    ends = [DIRECTIONS.coordinates(ARM, one) for one in (here, there)]
     tips = here[:, -1].copy(), there[:, -1].copy()
     lines = Intervals(*tips, *ends)
     for share in (0.0, 0.3, 1.0):

@@ -10,9 +10,8 @@ from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box
-from vdsm_pin.planner.fewest.charts import coordinates
+from vdsm_pin.planner.fewest.charts import OFFSETS, Intervals
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -54,7 +53,7 @@ def chart_lines(
     """The straight line in the chart between joint values, and its ends' centres."""
     rows = np.stack([begin, end])
     centres = joint_centres(arm, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
-    offsets, tips = coordinates(arm, centres, directed=False), centres[:, -1]
+    offsets, tips = OFFSETS.coordinates(arm, centres), centres[:, -1]
     return Intervals(tips[:1], tips[1:], offsets[:1], offsets[1:]), centres
 
 

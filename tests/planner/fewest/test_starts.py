@@ -18,8 +18,8 @@ from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.planner.fewest import explore
 from vdsm_pin.planner.fewest.added_nodes import checked_start, with_start
+from vdsm_pin.planner.fewest.charts import OFFSETS, Intervals
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
@@ -216,7 +216,7 @@ def test_a_start_bent_as_far_as_may_be_moves_no_less_judged(
         held = replace(task, scene=Scene((ball,) if blocked else ()))
         judge = Judge(held, link_clearance(held), 0.0, 1e-4, 1e-3)
         tip = centres[None, -1]
-        offsets = checked_start(judge, tip, directed=False)[None]
+        offsets = checked_start(judge, tip, OFFSETS)[None]
         clearances = judge.look(tip, offsets).clearances
         assert (clearances > 0.01).all()
         there = middle[None] + (middle - tip[0])

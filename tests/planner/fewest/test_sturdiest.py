@@ -11,8 +11,8 @@ from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.solids import Cylinder, Sphere
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.fewest.charts import Intervals
 from vdsm_pin.planner.fewest.judge import Judge, levers, link_margins
-from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, build_roadmap, link_by_link
 from vdsm_pin.planner.fewest.route import tip_route
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes

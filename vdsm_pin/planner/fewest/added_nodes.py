@@ -8,10 +8,9 @@ from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import LimitExceeded, NoPlanFound, NoWayOut, OutOfReach
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
 from vdsm_pin.planner.feasibility import rail_distance
-from vdsm_pin.planner.fewest.charts import coordinates
+from vdsm_pin.planner.fewest.charts import OFFSETS, Chart, Intervals
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, extended
 from vdsm_pin.planner.fewest.search import TURN
 from vdsm_pin.planner.start import start_centres
@@ -24,13 +23,13 @@ EXITS = 24
 """Nodes tried as the first step away from the start."""
 
 
-def checked_start(judge: Judge, tip: FloatArray, directed: bool) -> FloatArray:
+def checked_start(judge: Judge, tip: FloatArray, chart: Chart) -> FloatArray:
     """Shape coordinates of the arm at the start.
 
     Args:
         judge: Knows the limits.
         tip: Of the arm at the start, shape (1, 3); [m].
-        directed: Whether in directions of links.
+        chart: What coordinates.
 
     Raises:
         LimitExceeded: If it breaks a limit.
@@ -38,13 +37,13 @@ def checked_start(judge: Judge, tip: FloatArray, directed: bool) -> FloatArray:
     """
     problem = judge.problem
     arm, centres = problem.manipulator, start_centres(problem)
-    if directed or problem.path.start_joints is not None:
+    if chart is not OFFSETS or problem.path.start_joints is not None:
         ahead = np.diff(centres[:, 0])
-        if not (directed or (ahead > 0.0).all()):
+        if chart is OFFSETS and not (ahead > 0.0).all():
             link = int(np.argmin(ahead)) + 1
             message = f"link {link} leans backwards at the start; the chart ends there"
             raise NoPlanFound(message)
-        shape = coordinates(arm, centres[None], directed)[0]
+        shape = chart.coordinates(arm, centres[None])[0]
     else:
         shape = np.zeros((arm.n_links + 1, 2))
     _check_limits(judge, tip, shape[None])
@@ -63,7 +62,7 @@ def with_start(
     if judge.problem.path.start_joints is None and roadmap.index[0] >= 0:
         return roadmap, int(roadmap.index[0])
     tip = roadmap.route.tips[:1]
-    offsets = checked_start(judge, tip, directed=False)[None]
+    offsets = checked_start(judge, tip, OFFSETS)[None]
     clearances = judge.look(tip, offsets).clearances
     shapes = roadmap.shapes
     nodes = roadmap.nodes_at(0)

@@ -189,7 +189,7 @@ def _bends(axes: FloatArray, joint: int) -> bool:
 def lined_up_directions(
     axes: FloatArray, lengths: FloatArray, joint: int, way: int
 ) -> FloatArray:
-    """Arms with one joint in line with its neighbours; see `charts.in_line`.
+    """Arms with one joint in line with its neighbours; see `Offsets.in_line`.
 
     The base may be off its rail.
 

@@ -17,8 +17,8 @@ from vdsm_pin.errors import (
 )
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
+from vdsm_pin.planner.fewest.charts import standing
 from vdsm_pin.planner.fewest.explore import Explored
-from vdsm_pin.planner.fewest.motion import standing
 from vdsm_pin.planner.fewest.stuck import (
     Passage,
     at_reach,

@@ -17,9 +17,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.planner.fewest.charts import coordinates, mutated, settled, turned_towards
+from vdsm_pin.planner.fewest.charts import (
+    Intervals,
+    chart_of,
+    standing,
+    turned_towards,
+)
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Intervals, is_directed, standing
 from vdsm_pin.planner.tip_curve import followed, led_along
 from vdsm_pin.problem.pointing import angles_between
 
@@ -190,8 +194,8 @@ class Population:
         laid = led_along(tips, centres, self.arm.link_lengths)
         fits = np.isfinite(laid).all(axis=(1, 2))
         layer = np.arange(len(tips) if fits.all() else int(np.argmin(fits)))
-        directed = is_directed(root.offsets)
-        tips, offsets = tips[layer], coordinates(self.arm, laid[layer], directed)
+        tips, chart = tips[layer], chart_of(root.offsets)
+        offsets = chart.coordinates(self.arm, laid[layer])
         offsets[:1] = root.offsets
         aims = self.layers.asked(layer)
         clearances = judge.look(tips, offsets, aims).clearances
@@ -261,13 +265,14 @@ class Population:
         moved = tips[:, 1:] - self.grown.tips[parents, 1:]
         following = self._follow(offsets, parents, tips)
         moved[following] = 0.0
-        born = mutated(self.arm, offsets, moved, rng)
+        chart = chart_of(offsets)
+        born = chart.mutated(self.arm, offsets, moved, rng)
         kept = following[rng.random(len(following)) < UNCHANGED]
         born[kept] = offsets[kept]
         if self.layers.aim_weight_at(to) > 0.0:
             aims = self.layers.aims_at(to, n)
             born = turned_towards(born, aims, rng.random(n) < AIMED, rng)
-        return parents, tips, settled(self.arm, tips, born)
+        return parents, tips, chart.settled(self.arm, tips, born)
 
     def _follow(
         self, offsets: FloatArray, parents: IntArray, tips: FloatArray
@@ -280,7 +285,7 @@ class Population:
         laid = followed(before, tips[chosen], self.arm.link_lengths)
         fits = np.isfinite(laid).all(axis=(1, 2))
         chosen = chosen[fits]
-        offsets[chosen] = coordinates(self.arm, laid[fits], is_directed(offsets))
+        offsets[chosen] = chart_of(offsets).coordinates(self.arm, laid[fits])
         return chosen
 
     def _aim_cost(self, layer: int, offsets: FloatArray) -> FloatArray:

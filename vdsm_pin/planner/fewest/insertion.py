@@ -15,10 +15,11 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.added_nodes import checked_start
+from vdsm_pin.planner.fewest.charts import DIRECTIONS, OFFSETS, standing
 from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
-from vdsm_pin.planner.fewest.motion import Corners, standing
+from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.route import TipRoute, tip_route
 from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.stuck import Stuck
@@ -111,7 +112,8 @@ class _Visits:
         self.judge, self.space = judge, space
         self.route, self.level = route, level
         self.tips = route.tips[route.layers]
-        self.root = checked_start(judge, route.tips[:1], level.directed)
+        chart = DIRECTIONS if level.directed else OFFSETS
+        self.root = checked_start(judge, route.tips[:1], chart)
         self.back = way_back(start_centres(judge.problem))
         self.outside = space.begun_at(self.back[-1])
         self.rng = np.random.default_rng(level.seed)

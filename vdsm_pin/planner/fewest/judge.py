@@ -16,8 +16,9 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.broad_phase import BroadPhase, cuts_of
+from vdsm_pin.planner.fewest.charts import Intervals, standing
 from vdsm_pin.planner.fewest.interval_parts import LONG_TRAVEL, Parts, parts_of_pieces
-from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
+from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.offset_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.fewest.own_clearance import OwnClearance
 from vdsm_pin.planner.records import LinkClearance
@@ -393,7 +394,7 @@ class Judge:
         kept &= self._looking(intervals)
         ahead = np.minimum(ends[0][:, -1, 0], ends[1][:, -1, 0])
         near = np.flatnonzero(kept & (ahead - arm.total_length < arm.base_range[0]))
-        if near.size and intervals.directed:
+        if near.size and intervals.chart.keeps_rail:
             kept[near] = self._on_rail(intervals, near)
         elif near.size:
             least = arm.base_range[0] - TOLERANCES.planned_limit

@@ -7,11 +7,11 @@ straight at both corners stays straight. An offset with a corner at joint m is a
 there; where one knee turns into another, both are bent on the way and no third one.
 
 Where a link leans backwards that chart ends. There the directions of the links stand in
-place of the offsets (`direction_kernels.py`), and the base may be held to a short rail.
+place of the offsets (`charts`), and the base may be held to a short rail.
 """
 
 import itertools
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -20,8 +20,7 @@ from vdsm_pin.arm.kinematics import joint_angles, joint_centres
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.direction_kernels import placed_between
-from vdsm_pin.planner.fewest.offset_kernels import Lines, centres_between, knees_between
+from vdsm_pin.planner.fewest.charts import Intervals
 from vdsm_pin.planner.spacing import STRAYS, count_of, row_steps, spread
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -77,12 +76,7 @@ class Corners:
             with_those(self.drawn, np.zeros(count, np.bool_), end),
         )
 
-    def unit(self, manipulator: Manipulator) -> float:
-        """Way of the tip that one of the offsets counts for; [-], of directions [m]."""
-        directed = is_directed(self.offsets)
-        return manipulator.total_length / 3.0 if directed else 1.0
-
-    def pick(self, intervals: IntArray) -> "Intervals":
+    def pick(self, intervals: IntArray) -> Intervals:
         """Some intervals on their own."""
         return Intervals(
             self.tips[intervals],
@@ -90,104 +84,6 @@ class Corners:
             self.offsets[intervals],
             self.offsets[intervals + 1],
         )
-
-
-@dataclass(frozen=True)
-class Intervals:
-    """Straight lines in the chart, each on its own.
-
-    Args:
-        tips: Where they begin, shape (n, 3); [m].
-        next_tips: Where they end; [m].
-        offsets: D_1..D_{N+1} where they begin, shape (n, N + 1, 2) [m], or the
-            directions of the links, shape (n, N, 3) [-].
-        next_offsets: The same where they end.
-        aims: Where the last link shall look at both ends, NaN for anywhere, shape
-            (n, 2, 3), see `Pointing.aims`; None for anywhere in all of them.
-    """
-
-    tips: FloatArray
-    next_tips: FloatArray
-    offsets: FloatArray
-    next_offsets: FloatArray
-    aims: FloatArray | None = None
-
-    def __post_init__(self) -> None:
-        """Lay the arrays out in one way, so that kernels are compiled for one."""
-        for field in fields(self)[:4]:
-            value = np.require(getattr(self, field.name), float, ["C", "W"])
-            object.__setattr__(self, field.name, value)
-
-    def part(self, rows: slice) -> "Intervals":
-        """Some of them."""
-        aims = None if self.aims is None else self.aims[rows]
-        return Intervals(
-            self.tips[rows],
-            self.next_tips[rows],
-            self.offsets[rows],
-            self.next_offsets[rows],
-            aims,
-        )
-
-    def knees(self, manipulator: Manipulator) -> BoolArray:
-        """Joints where the arm may bend somewhere in each interval, and both ends.
-
-        Returns:
-            Shape (n, N + 1).
-        """
-        if self.directed:
-            return np.ones((len(self.tips), manipulator.n_links + 1), dtype=np.bool_)
-        return knees_between(
-            self.offsets, self.next_offsets, manipulator.link_lengths,
-            TOLERANCES.straight_slope,
-        )  # fmt: skip
-
-    @property
-    def directed(self) -> bool:
-        """Whether links are given by their directions."""
-        return is_directed(self.offsets)
-
-    def continued(self) -> BoolArray:
-        """Whether each interval ends where the next begins, shape (n,)."""
-        same = np.zeros(len(self.tips), dtype=np.bool_)
-        same[:-1] = (self.next_tips[:-1] == self.tips[1:]).all(axis=1)
-        same[:-1] &= (self.next_offsets[:-1] == self.offsets[1:]).all(axis=(1, 2))
-        return same
-
-    def centres(
-        self, manipulator: Manipulator, interval: IntArray, share: FloatArray
-    ) -> FloatArray:
-        """Joint centres at places of the intervals (Eq. 7).
-
-        Args:
-            manipulator: The arm.
-            interval: Interval of each place, shape (r,).
-            share: Where in its interval, 0 to 1, shape (r,).
-
-        Returns:
-            Shape (r, N + 1, 3), NaN where a link is too short or the base is off its
-            rail; [m].
-        """
-        lines = Lines(self.tips, self.next_tips, self.offsets, self.next_offsets)
-        lengths, ratios = manipulator.link_lengths, manipulator.ratios
-        if self.directed:
-            rail = manipulator.base_range
-            return placed_between(lines, interval, share, lengths, rail)
-        return centres_between(lines, interval, share, ratios, lengths)
-
-
-def is_directed(offsets: FloatArray) -> bool:
-    """Whether shape coordinates are directions of links."""
-    return bool(offsets.shape[2] == 3)
-
-
-def standing(
-    manipulator: Manipulator, tips: FloatArray, offsets: FloatArray
-) -> FloatArray:
-    """Joint centres of configurations, shape (n, N + 1, 3); see `Intervals.centres`."""
-    number = np.arange(len(tips))
-    still = Intervals(tips, tips, offsets, offsets)
-    return still.centres(manipulator, number, np.zeros(len(tips)))
 
 
 @dataclass(frozen=True)

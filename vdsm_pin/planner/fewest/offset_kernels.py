@@ -296,7 +296,7 @@ def mutated_offsets(
 def lined_up(
     offsets: FloatArray, stations: FloatArray, joint: int, way: int
 ) -> FloatArray:
-    """Arms with one joint in line with its neighbours; see `charts.in_line`.
+    """Arms with one joint in line with its neighbours; see `Offsets.in_line`.
 
     Args:
         offsets: D_1..D_{N+1}, shape (n, N + 1, 2); [m].

@@ -10,7 +10,7 @@ import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.charts import Intervals
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES

@@ -15,9 +15,9 @@ import numpy as np
 from vdsm_pin.compiled import compiled
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, distinct
-from vdsm_pin.planner.fewest.charts import coordinates, in_line
+from vdsm_pin.planner.fewest.charts import OFFSETS, chart_of, standing
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Corners, is_directed, standing
+from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -43,7 +43,7 @@ def _flattened(judge: Judge, corners: Corners, spans: list[tuple[int, int]]) -> 
 
 def _ways(judge: Judge, corners: Corners) -> FloatArray:
     """How far apart corners are: along the path, or as tip and shape move, (n - 1,)."""
-    unit = corners.unit(judge.problem.manipulator)
+    unit = chart_of(corners.offsets).unit(judge.problem.manipulator)
     turns = np.abs(np.diff(corners.offsets, axis=0)).max(axis=(1, 2))
     moved = np.linalg.norm(np.diff(corners.tips, axis=0), axis=1) + unit * turns
     return np.where(corners.drawn, np.abs(np.diff(corners.stations)), moved)
@@ -281,7 +281,7 @@ def _stepped_back(corners: Corners, begin: int, end: int, depth: float) -> Corne
 JOINT_ROUNDS: Final = 4
 """Rounds over all joints."""
 WAYS: Final = (-1, 1, 0)
-"""How a joint is made straight, in this order, see `in_line`."""
+"""How a joint is made straight, in this order, see `Offsets.in_line`."""
 
 
 def sparser(judge: Judge, corners: Corners) -> Corners:
@@ -351,13 +351,13 @@ def _in_order(judge: Judge, motion: _Bent, joints: range) -> _Bent:
 
 def projected(judge: Judge, corners: Corners) -> Corners:
     """Corners given by projections if all links lean ahead and all ways stay clear."""
-    if not is_directed(corners.offsets):
+    if chart_of(corners.offsets) is OFFSETS:
         return corners
     arm = judge.problem.manipulator
     centres = standing(arm, corners.tips, corners.offsets)
     if not (np.diff(centres[:, :, 0], axis=1) > 0.0).all():
         return corners
-    offsets = coordinates(arm, centres, directed=False)
+    offsets = OFFSETS.coordinates(arm, centres)
     trial = replace(corners, offsets=offsets)
     clear = judge.clear(judge.lines(trial, np.arange(len(corners.drawn))))
     return trial if clear.all() else corners
@@ -370,7 +370,7 @@ def _without(judge: Judge, motion: _Bent, joint: int, way: int) -> Corners:
         judge: Says what is clear.
         motion: Its corners, and where they bend.
         joint: The joint, counted from 0.
-        way: How it is made straight, see `in_line`.
+        way: How it is made straight, see `Offsets.in_line`.
     """
     arm, corners = judge.problem.manipulator, motion.corners
     tips, bent = corners.tips, motion.bent
@@ -381,7 +381,8 @@ def _without(judge: Judge, motion: _Bent, joint: int, way: int) -> Corners:
     if not len(rows):
         return corners
     before, trial = bent[rows].sum(axis=1), corners.offsets.copy()
-    trial[rows] = in_line(arm, tips[rows], trial[rows], joint, way)
+    chart = chart_of(trial)
+    trial[rows] = chart.in_line(arm, tips[rows], trial[rows], joint, way)
     after = judge.bends(tips[rows], trial[rows]) > TOLERANCES.changed_angle
     fewer = after.sum(axis=1) < before
     rows, wanted = rows[fewer], bent.copy()
