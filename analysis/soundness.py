@@ -202,12 +202,11 @@ def whole(batch: Batch) -> tuple[Any, Any]:
         columns = np.flatnonzero((i == batch.frame[0]) & (k == batch.link[0]))
     tip = np.array([arm.total_length, 0.0, 0.0])
     problem = PlanningProblem(
-        name="queries",
         manipulator=arm,
         scene=Scene(tuple(bodies)),
         tip_path=DesiredPath(tip, tip[None]),
         required_clearance=clearance,
-        T_world_base=np.eye(4),
+        name="queries",
         required_self_clearance=between,
     )
     q, blank = batch.rows, np.zeros(len(batch.rows))

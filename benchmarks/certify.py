@@ -165,7 +165,7 @@ def problem_of(
     point = np.array([arm.total_length, 0.0, 0.0])
     path = DesiredPath(point, point[None])
     scene = Scene(tuple(obstacles))
-    return PlanningProblem("bench", arm, scene, path, 0.99 * clearance, np.eye(4))
+    return PlanningProblem(arm, scene, path, 0.99 * clearance, name="bench")
 
 
 def measure(

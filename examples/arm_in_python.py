@@ -27,7 +27,7 @@ scene = vp.Scene(
 tip = arm.total_length * x
 corners = tip + np.array([[0, 0, 0.03], [0, -0.06, 0.0], [0, 0, -0.03], [0, 0.03, 0]])
 path = vp.DesiredPath(tip, corners, closed=True, spacing=0.001)
-problem = vp.Problem("endoscope", arm, scene, path, 0.0005, np.eye(4))
+problem = vp.Problem(arm, scene, path, 0.0005, name="endoscope")
 problem = vp.write_problem(problem, "endoscope.yaml")  # certificates need a file
 
 plan = vp.plan(problem)

@@ -41,9 +41,7 @@ motion = vp.Trajectory(
     table[:, 1 : n + 1],
     table[:, n + 1 :],
 )
-free = vp.Problem(
-    "dls", arm, problem.scene, None, problem.required_clearance, np.eye(4)
-)
+free = vp.Problem(arm, problem.scene, None, problem.required_clearance, name="dls")
 theirs, ours = vp.verify(free, motion), vp.verify(problem, vp.plan(problem).trajectory)
 print(
     f"damped least squares: {theirs.verdict.value}, {1e3 * theirs.min_clearance:.1f} mm"

@@ -15,7 +15,7 @@ arm = vp.Manipulator(
     vp.CableLayout(0.0016, 0.02, np.radians(np.arange(9.0).reshape(3, 3) * 40.0)),
 )
 wire = vp.Capsule("wire", np.array([1.2, 0.0, -0.419]), np.eye(3)[1], 0.1, 1e-4)
-problem = vp.Problem("wire", arm, vp.Scene((wire,)), None, 0.0, np.eye(4))
+problem = vp.Problem(arm, vp.Scene((wire,)), None, 0.0, name="wire")
 
 
 def sweep(rows: int) -> vp.Trajectory:

@@ -62,7 +62,7 @@ def problem(scene: Scene | None = None) -> PlanningProblem:
     path = DesiredPath(np.array([3.126, 0, 0]), np.array(square), closed=True)
     arm = built_in("hrm8")
     obstacles = every_shape() if scene is None else scene
-    return PlanningProblem("made up", arm, obstacles, path, 0.0035, np.eye(4))
+    return PlanningProblem(arm, obstacles, path, 0.0035, name="made up")
 
 
 def trajectory(n: int = 200) -> Trajectory:

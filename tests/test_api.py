@@ -78,7 +78,7 @@ def in_python(name: str = "mine") -> vp.Problem:
         points=np.array([[1.0, 0.0, 0.0], [1.2, 0.0, 0.0]]),
     )
     ball = vp.Sphere("ball", np.array([0.6, 0.3, 0.0]), 0.1)
-    return vp.Problem(name, ARM, vp.Scene((ball,)), path, 0.01, np.eye(4))
+    return vp.Problem(ARM, vp.Scene((ball,)), path, 0.01, name=name)
 
 
 def test_a_problem_built_in_python_is_planned_verified_and_reported(

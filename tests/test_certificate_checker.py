@@ -353,7 +353,7 @@ def test_the_order_is_judged_as_the_verifier_judges_it(closed: bool) -> None:
     corners = np.array([[0.0, 0, 0], [0.5, 0, 0], [0.5, 0.7, 0], [0, 0.7, 0.1]])
     path = DesiredPath(corners[0], corners, closed)
     arm, rng, verdicts = built_in("hrm8"), np.random.default_rng(5), []
-    problem = PlanningProblem("walk", arm, Scene(), path, 0.0, np.eye(4))
+    problem = PlanningProblem(arm, Scene(), path, 0.0, name="walk")
     for _ in range(400):
         n = int(rng.integers(2, 9))
         steps = rng.choice([0.05, 0.3, 0.6, -4e-7, -5e-6, -0.1], n,

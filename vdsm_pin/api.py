@@ -295,7 +295,7 @@ def write_problem(problem: PlanningProblem, path: str | Path) -> PlanningProblem
         >>> ball = vp.Sphere("ball", np.array([2.0, 0.5, 0.0]), 0.1)
         >>> path = vp.DesiredPath(np.array([3.126, 0, 0]), np.array([[3.1, 0.4, 0.2]]))
         >>> arm, scene = vp.built_in("hrm8"), vp.Scene((ball,))
-        >>> problem = vp.Problem("one", arm, scene, path, 0.01, np.eye(4))
+        >>> problem = vp.Problem(arm, scene, path, 0.01, name="one")
         >>> problem = write_problem(problem, "out/api/one.yaml")
         >>> problem.source.path.name
         'one.yaml'

@@ -129,10 +129,12 @@ def sleeved(rng: Rng, arm: Manipulator) -> Sleeved | None:
     rail = (float(rows[0, 0] - spare), float(rows[-1, 0] + spare))
     tips = centres[[0, -1], -1]
     bare = PlanningProblem(
-        "sleeved", replace(arm, base_range=rail), Scene(()),
+        replace(arm, base_range=rail),
+        Scene(()),
         DesiredPath(tips[0], tips, start_joints=joints),
-        required_clearance(arm), np.eye(4),
-    )  # fmt: skip
+        required_clearance(arm),
+        name="sleeved",
+    )
     links = [arm.n_links - 1, *rng.integers(arm.n_links, size=2).tolist()]
     boards = [b for k in dict.fromkeys(links) for b in _sleeve(rng, arm, centres[0], k)]
     kept = tuple(board for board in boards if _room(bare, (board,), centres) >= 0.0)

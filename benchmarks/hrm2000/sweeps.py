@@ -75,7 +75,7 @@ class Sweep:
 
     @cached_property
     def _alone(self) -> PlanningProblem:
-        return PlanningProblem("sweep", self.arm, Scene(()), None, 0.0, np.eye(4))
+        return PlanningProblem(self.arm, Scene(()), None, 0.0, name="sweep")
 
     @cached_property
     def _few(self) -> FloatArray:

@@ -257,7 +257,7 @@ def test_limits_of_smooth_motions_are_those_of_the_curve(degree: int) -> None:
     rng, said = np.random.default_rng(degree), Counter[tuple[bool, bool]]()
     arm = replace(built_in("hrm8"), max_joint_angle=1.4, max_link_angle=1.5)
     rows = Rows.__new__(Rows)
-    rows.problem = PlanningProblem("p", arm, Scene(), None, 0.0, np.eye(4))
+    rows.problem = PlanningProblem(arm, Scene(), None, 0.0, name="p")
     time = np.linspace(0.0, 1.0, 20_001)
     weights = [comb(degree, i) * time**i * (1 - time) ** (degree - i)
                for i in range(degree + 1)]  # fmt: skip
@@ -302,7 +302,7 @@ def test_the_change_of_smooth_rows_is_judged_as_the_verifier_judges_it(
         for more_than in (-1e-6, 1e-5, 3e-4, 1e-3, 3e-3):
             limit = float(turn * (1.0 + more_than))
             rows.problem = PlanningProblem(
-                "p", arm, Scene(), None, 0.0, np.eye(4), max_row_change=limit
+                arm, Scene(), None, 0.0, name="p", max_row_change=limit
             )
             accepted = True
             with ctx.workprec(PRECISION):

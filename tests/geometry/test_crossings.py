@@ -61,7 +61,7 @@ def test_a_link_inside_a_closed_box_is_not_clear(width: float) -> None:
     box = Mesh("box", np.asarray(solid.vertices), np.asarray(solid.faces))
     point = np.array([arm.total_length, 0.0, 0.0])
     path = DesiredPath(point, point[None])
-    problem = PlanningProblem("box", arm, Scene((box,)), path, 0.0, np.eye(4))
+    problem = PlanningProblem(arm, Scene((box,)), path, 0.0, name="box")
     along = np.concatenate([[0.0], np.cumsum(arm.link_lengths)])
     centres = np.stack([along, 0.0 * along, 0.0 * along], axis=1)[None]
     assert (link_clearance(problem)(centres) < 0.0).all()

@@ -23,7 +23,7 @@ def asked(arm: Manipulator, balls: tuple[Box | Sphere, ...]) -> PlanningProblem:
     """To draw something, from where the straight arm has x0 = 0."""
     tip = np.array([arm.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None] + 0.1, False)
-    return PlanningProblem("feed", arm, Scene(balls), path, REQUIRED, np.eye(4))
+    return PlanningProblem(arm, Scene(balls), path, REQUIRED, name="feed")
 
 
 def too_near(ball: Sphere, error: float) -> tuple[float, float]:

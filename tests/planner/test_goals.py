@@ -55,7 +55,7 @@ def posture(joints: np.ndarray) -> Posture:
 def to(goal: Posture, *obstacles: Obstacle, start: Posture = START) -> PlanningProblem:
     scene = Scene(tuple(obstacles))
     return PlanningProblem(
-        "goal", ARM, scene, None, 0.0035, np.eye(4), start=start, goal=goal
+        ARM, scene, None, 0.0035, name="goal", start=start, goal=goal
     )
 
 
@@ -146,7 +146,7 @@ def test_the_arm_goes_home_the_way_it_came() -> None:
     points = np.array([[1.4, 0.0, 0.0], [1.4, 0.1, 0.1]])
     path = DesiredPath(START.tip, points, home=True)
     scene = Scene(tuple(wall(0.12)))
-    task = PlanningProblem("home", ARM, scene, path, 0.0035, np.eye(4))
+    task = PlanningProblem(ARM, scene, path, 0.0035, name="home")
     found = plan_and_verify(task, "fewest")
     there = plan_and_verify(replace(task, tip_path=replace(path, home=False)), "fewest")
     assert found.verification.verdict is Verdict.CERTIFIED

@@ -31,7 +31,7 @@ def arc(radius: float, degrees: float) -> FloatArray:
 
 def task(insertion: FloatArray, points: FloatArray, *balls: Sphere) -> PlanningProblem:
     path = DesiredPath(np.zeros(3), points, insertion=insertion)
-    return PlanningProblem("nose", ARM, Scene(balls), path, 0.0035, np.eye(4))
+    return PlanningProblem(ARM, Scene(balls), path, 0.0035, name="nose")
 
 
 def from_line(points: FloatArray, corners: FloatArray) -> FloatArray:
@@ -102,7 +102,7 @@ def test_a_bent_start_is_left_along_its_own_curve() -> None:
     path = DesiredPath(
         tip, np.array(rest[-1:]), start_joints=joints, insertion=np.array(rest[:-1])
     )
-    problem = PlanningProblem("bent", ARM, Scene(()), path, 0.0035, np.eye(4))
+    problem = PlanningProblem(ARM, Scene(()), path, 0.0035, name="bent")
     found = plan_and_verify(problem, NAME)
     assert found.verification.verdict is Verdict.CERTIFIED
     np.testing.assert_allclose(found.plan.trajectory.joints[0], joints, atol=1e-12)

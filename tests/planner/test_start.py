@@ -38,7 +38,7 @@ def starting(gap: float, joints: np.ndarray | None = None) -> PlanningProblem:
         tip = joint_centres(ARM, joints[:1], joints[None, 1::2], joints[None, 2::2])
         tip = tip[0, -1]
     path = DesiredPath(tip, POINTS, False, start_joints=joints)
-    return PlanningProblem("start", ARM, Scene((post,)), path, 0.0035, np.eye(4))
+    return PlanningProblem(ARM, Scene((post,)), path, 0.0035, name="start")
 
 
 def refusal(task: PlanningProblem, name: str) -> StartBlocked:
@@ -111,7 +111,7 @@ def test_a_blocked_start_names_the_link_that_is_too_near_and_by_how_much(
     tip = np.array([arm.total_length, 0.0, 0.0])
     path = DesiredPath(tip, np.stack([tip, tip + np.array([0.0, 0.1, 0.0])]), False)
     scene = Scene((ball, thin))
-    task = PlanningProblem("start", arm, scene, path, 0.005, np.eye(4))
+    task = PlanningProblem(arm, scene, path, 0.005, name="start")
     caught = refusal(task, "fewest")
     assert (caught.link, caught.obstacle) == (link, "ball")
     assert caught.clearance == pytest.approx(abs(place[1]) - 0.018 - reach, abs=1e-8)
@@ -126,7 +126,7 @@ def test_a_feed_that_is_too_near_at_the_start_is_named(name: str) -> None:
     tip = np.array([1.6, 0.0, 0.0])
     path = DesiredPath(tip, np.stack([tip, tip + np.array([0.0, 0.1, 0.0])]), False)
     scene = Scene((behind, ball))
-    task = PlanningProblem("feed", arm, scene, path, 0.005, np.eye(4))
+    task = PlanningProblem(arm, scene, path, 0.005, name="feed")
     caught = refusal(task, name)
     assert (caught.link, caught.obstacle) == (0, "ball")
     assert caught.clearance == pytest.approx(0.0045, abs=1e-8)
@@ -152,7 +152,7 @@ def test_a_narrow_place_is_as_wide_as_it_is_however_thick_the_links() -> None:
         for name, side in (("left", 0.15), ("right", -0.15))
     )
     path = DesiredPath(np.array([1.6, 0.0, 0.0]), POINTS, False)
-    task = PlanningProblem("walls", arm, Scene(walls), path, 0.005, np.eye(4))
+    task = PlanningProblem(arm, Scene(walls), path, 0.005, name="walls")
     told = str(no_way_in(task, np.array([1.0, 0.0, 0.0])).words)
     # The tip is the first to pass, and thick links may stay outside.
     assert "100.000 mm wide, for a body of 40.000 mm" in told
@@ -196,7 +196,7 @@ def test_clearances_are_those_of_the_pairs_that_are_held_apart(
     left_out = [pair for pair in pairs if rng.random() < 0.4]
     asked = replace(arm, ignore_pairs=tuple(left_out))
     path = DesiredPath(np.array([3.126, 0.0, 0.0]), POINTS, False)
-    task = PlanningProblem("balls", asked, Scene(balls), path, 0.0, np.eye(4))
+    task = PlanningProblem(asked, Scene(balls), path, 0.0, name="balls")
     centres = joint_centres(
         arm, np.zeros(50), *rng.uniform(-0.4, 0.4, (2, 50, arm.n_links))
     )
@@ -241,7 +241,7 @@ def test_a_tool_passes_where_its_link_may_touch() -> None:
     arm = replace(ARM, tool=Tool(0.15, 0.01), ignore_pairs=(("link 8", "slab"),))
     points = np.array([[3.126, 0.0, 0.0], [3.126, 0.1, 0.0]])
     path = DesiredPath(np.array([3.126, 0.0, -0.2]), points, False)
-    task = PlanningProblem("slab", arm, Scene((slab,)), path, 0.0035, np.eye(4))
+    task = PlanningProblem(arm, Scene((slab,)), path, 0.0035, name="slab")
     plan = plan_fewest(task, link_clearance(task), 0.0)
     assert plan.undrawn == ()
     axes = arm.axes(plan.centres)
@@ -254,7 +254,7 @@ def test_what_is_ignored_proves_nothing() -> None:
     ball = Sphere("ball", POINTS[1], 0.05)
     tip = np.array([3.126, 0.0, 0.0])
     path = DesiredPath(tip, POINTS, False)
-    task = PlanningProblem("ball", ARM, Scene((ball,)), path, 0.0035, np.eye(4))
+    task = PlanningProblem(ARM, Scene((ball,)), path, 0.0035, name="ball")
     rows = POINTS
     assert prove_tips(task, link_clearance(task), rows).undrawable.any()
     plan = plan_fewest(task, link_clearance(task), 0.0)

@@ -32,9 +32,7 @@ ARMS = {
 
 
 def problem(arm: Manipulator, **kept: object) -> PlanningProblem:
-    return replace(
-        PlanningProblem("own", arm, Scene(()), None, 0.003, np.eye(4)), **kept
-    )
+    return replace(PlanningProblem(arm, Scene(()), None, 0.003, name="own"), **kept)
 
 
 def postures(count: int, seed: int = 3, curl: float = 0.0) -> tuple[FloatArray, ...]:

@@ -68,7 +68,7 @@ def problem_with(
     tip = np.array([arm.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
     shapes = scene.Scene(obstacles)
-    return PlanningProblem("p", arm, shapes, path, required, np.eye(4))
+    return PlanningProblem(arm, shapes, path, required, name="p")
 
 
 def rows_of(rng: np.random.Generator, size: float, n: int = 12) -> Trajectory:

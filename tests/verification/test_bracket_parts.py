@@ -92,7 +92,7 @@ NAMES = ("a", "b", "c")
 
 def problem() -> PlanningProblem:
     balls = tuple(Sphere(name, np.full(3, 9.0), 0.1) for name in NAMES)
-    return PlanningProblem("p", ARM, Scene(balls), None, 0.0, np.eye(4))
+    return PlanningProblem(ARM, Scene(balls), None, 0.0, name="p")
 
 
 def random_knots(rng: np.random.Generator, n: int) -> Knots:
@@ -657,7 +657,7 @@ def test_a_profile_has_each_link_by_itself(feed: Feed | None) -> None:
         x = ARM.stations[k] + ARM.link_lengths[k] / 2.0 if feed is None else -0.15
         thick = ARM.link_radius if feed is None else 0.05
         ball = Sphere("ball", np.array([x, 0.1 + thick + 0.004, 0.0]), 0.1)
-        asked = PlanningProblem("p", arm, Scene((ball,)), None, 0.0, np.eye(4))
+        asked = PlanningProblem(arm, Scene((ball,)), None, 0.0, name="p")
         profile = prove_clearance(asked, rest, ErrorBox()).profile
         assert profile.link_lower.shape == (1, 8)
         assert int(profile.link_lower.argmin()) == k
@@ -670,7 +670,7 @@ def test_sinks_hear_of_every_interval_once(monkeypatch: pytest.MonkeyPatch) -> N
     """In chunks that follow one another, and the proof says how many were sent."""
     monkeypatch.setattr(clearance, "CHUNK_VALUES", 29 * (2 * BLOCK + 1))
     ball = Sphere("ball", np.array([1.0, 0.3, 0.0]), 0.1)
-    asked = PlanningProblem("p", ARM, Scene((ball,)), None, 0.0, np.eye(4))
+    asked = PlanningProblem(ARM, Scene((ball,)), None, 0.0, name="p")
     for rows, most in ((3 * BLOCK, 2 * BLOCK), (1, 7), (2, 7), (8, 7), (30, 7)):
         still, chunks = np.zeros((rows, 8)), list[ClearanceChunk]()
         rest = np.zeros(rows)
@@ -745,7 +745,7 @@ def test_what_begins_inside_is_refuted_from_the_beginning() -> None:
 
 
 def test_without_obstacles_nothing_is_missing() -> None:
-    problem = PlanningProblem("p", ARM, Scene(), None, 0.1, np.eye(4))
+    problem = PlanningProblem(ARM, Scene(), None, 0.1, name="p")
     still, rows = np.zeros(2), np.zeros((2, ARM.n_links))
     motion = Trajectory(still > 0, still, still, rows, rows)
     assert margins.CoalMeasure(problem)(motion) == ()
@@ -791,7 +791,7 @@ def test_a_profile_has_a_column_for_each_link_and_each_obstacle() -> None:
     """The feed, behind the base, counts with link 1; links among them with none."""
     arm, n = replace(ARM, feed=Feed(0.3, 0.05)), ARM.n_links
     balls = tuple(Sphere(f"b{k}", np.array([9.0, k, 9.0]), 0.1) for k in range(3))
-    asked = arm_assembly(PlanningProblem("p", arm, Scene(balls), None, 0.0, np.eye(4)))
+    asked = arm_assembly(PlanningProblem(arm, Scene(balls), None, 0.0, name="p"))
     question, task = asked.question, asked.question.task
     assert question.n_columns == n + 3
     links = [max(link, 1) - 1 for link in asked.links]

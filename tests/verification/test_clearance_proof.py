@@ -32,7 +32,7 @@ SPHERE = Sphere("ball", np.array([2.0, 0.45, 0.1]), 0.2)
 def problem_with(*obstacles: Obstacle, required: float = 0.0) -> PlanningProblem:
     point = np.array([3.126, 0.0, 0.0])
     path = DesiredPath(point, point[None])
-    return PlanningProblem("p", ARM, Scene(obstacles), path, required, np.eye(4))
+    return PlanningProblem(ARM, Scene(obstacles), path, required, name="p")
 
 
 def motion(seed: int, n_rows: int = 6, size: float = 0.12) -> Trajectory:

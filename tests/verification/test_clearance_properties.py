@@ -108,9 +108,7 @@ def obstacle_of(shape: str, rng: np.random.Generator) -> scene.Obstacle:
 def problem_of(*obstacles: scene.Obstacle, required: float = 0.0) -> PlanningProblem:
     tip = np.array([LENGTHS.sum(), 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    return PlanningProblem(
-        "any", arm(), scene.Scene(obstacles), path, required, np.eye(4)
-    )
+    return PlanningProblem(arm(), scene.Scene(obstacles), path, required, name="any")
 
 
 def motion_of(rng: np.random.Generator, n_rows: int, step: float) -> Trajectory:

@@ -40,7 +40,7 @@ def motion(seed: int) -> Trajectory:
 
 
 def problem(*obstacles: Obstacle) -> PlanningProblem:
-    return PlanningProblem("p", ARM, Scene(obstacles), None, 0.01, np.eye(4))
+    return PlanningProblem(ARM, Scene(obstacles), None, 0.01, name="p")
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -255,7 +255,7 @@ def room(half: float, solid: bool) -> PlanningProblem:
     mesh = Mesh("room", shell.vertices, shell.faces, solid)
     tip = np.array([HRM8.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    return PlanningProblem("in", HRM8, Scene((mesh,)), path, 0.0035, np.eye(4))
+    return PlanningProblem(HRM8, Scene((mesh,)), path, 0.0035, name="in")
 
 
 def test_inside_a_solid_mesh_coal_speaks_of_its_skin_only() -> None:

@@ -82,9 +82,7 @@ def problem_with(
 ) -> PlanningProblem:
     tip = np.array([HRM8.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    return PlanningProblem(
-        "any", HRM8, scene.Scene(obstacles), path, clearance, np.eye(4)
-    )
+    return PlanningProblem(HRM8, scene.Scene(obstacles), path, clearance, name="any")
 
 
 def trajectory_of(n: int, seed: int = 1, size: float = 0.3) -> Trajectory:

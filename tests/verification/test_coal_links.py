@@ -30,9 +30,7 @@ def coiling_arm(n_links: int) -> Manipulator:
 
 def problem_for(arm: Manipulator) -> PlanningProblem:
     tip = np.array([arm.total_length, 0.0, 0.0])
-    return PlanningProblem(
-        "any", arm, Scene(), DesiredPath(tip, tip[None]), 0.0, np.eye(4)
-    )
+    return PlanningProblem(arm, Scene(), DesiredPath(tip, tip[None]), 0.0, name="any")
 
 
 def trajectory_of(arm: Manipulator, n: int, size: float) -> Trajectory:

@@ -47,7 +47,9 @@ def problem_with(
 ) -> PlanningProblem:
     tip = np.array([LENGTH, 0.0, 0.0])
     scene, path = Scene(obstacles), DesiredPath(tip, tip[None])
-    return PlanningProblem("p", ARM, scene, path, required, np.eye(4), between)
+    return PlanningProblem(
+        ARM, scene, path, required, name="p", required_self_clearance=between
+    )
 
 
 def motion(n_rows: int, seed: int = 0, size: float = 0.0) -> Trajectory:
@@ -182,7 +184,12 @@ def test_links_that_errors_bring_together_are_refuted() -> None:
     arm = Manipulator("u", np.full(n, 0.3), 0.04, 1.5, 1.5, (-5.0, 5.0), cables)
     tip = np.array([1.8, 0.0, 0.0])
     problem = PlanningProblem(
-        "u", arm, Scene(), DesiredPath(tip, tip[None]), 0.0, np.eye(4), 0.05
+        arm,
+        Scene(),
+        DesiredPath(tip, tip[None]),
+        0.0,
+        name="u",
+        required_self_clearance=0.05,
     )
     alpha = np.zeros((2, n))
     alpha[:, [2, 3]] = 1.2  # a hook: link 5 looks back at link 2

@@ -26,7 +26,7 @@ def asked(closed: bool, tolerance: float) -> PlanningProblem:
     corners = SQUARE if closed else LINE
     path = DesiredPath(corners[0], corners, closed=closed)
     return PlanningProblem(
-        "p", ARM, Scene(), path, 0.0, np.eye(4), tip_tolerance=tolerance / CELLS
+        ARM, Scene(), path, 0.0, name="p", tip_tolerance=tolerance / CELLS
     )
 
 

@@ -31,7 +31,7 @@ def wall(distance: float, required: float = 0.01) -> PlanningProblem:
     x = np.array([1.0, 0.0, 0.0])
     front = ARM.total_length + ARM.link_radius + distance
     scene = Scene((Sphere("ball", -5.0 * x, 0.1), HalfSpace("wall", front * x, -x)))
-    return PlanningProblem("wall", ARM, scene, None, required, np.eye(4))
+    return PlanningProblem(ARM, scene, None, required, name="wall")
 
 
 @pytest.mark.parametrize("n", [11, 501])
@@ -75,7 +75,9 @@ def curling() -> tuple[PlanningProblem, Trajectory]:
     alpha = share * np.array([0.0, 1.2, 1.2, 1.2])
     none = np.zeros(6)
     motion = Trajectory(none.astype(bool), none, none, alpha, 0.01 * alpha)
-    return PlanningProblem("curl", arm, Scene(), None, 0.0, np.eye(4), 0.03), motion
+    return PlanningProblem(
+        arm, Scene(), None, 0.0, name="curl", required_self_clearance=0.03
+    ), motion
 
 
 def test_links_that_meet_are_named_at_their_first_moment_and_at_their_worst() -> None:

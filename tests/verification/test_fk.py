@@ -22,7 +22,7 @@ HRM8 = built_in("hrm8")
 def problem_for(arm: Manipulator) -> PlanningProblem:
     tip = np.array([arm.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    return PlanningProblem("any", arm, Scene(), path, 0.0, np.eye(4))
+    return PlanningProblem(arm, Scene(), path, 0.0, name="any")
 
 
 def trajectory_of(n: int, seed: int = 1) -> Trajectory:

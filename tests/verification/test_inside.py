@@ -451,6 +451,6 @@ def test_gaps_are_told_where_they_are_more_than_rounding(gap: float, told: int) 
     faces = np.arange(len(corners) * 3).reshape(-1, 3)
     mesh = Mesh("hall", corners.reshape(-1, 3), faces)
     scene = Scene((mesh,))
-    problem = PlanningProblem("p", built_in("hrm8"), scene, None, 0.0, np.eye(4))
+    problem = PlanningProblem(built_in("hrm8"), scene, None, 0.0, name="p")
     assert mesh.closed_mesh.closed and mesh.closed_mesh.gap > 0.5 * gap
     assert len(mesh_notes(problem)) == told

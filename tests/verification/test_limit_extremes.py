@@ -26,7 +26,7 @@ ARM = replace(
 )
 TIP = np.array([ARM.total_length, 0.0, 0.0])
 PROBLEM = PlanningProblem(
-    "p", ARM, Scene(), DesiredPath(TIP, TIP[None]), 0.0, np.eye(4), max_row_change=STEP
+    ARM, Scene(), DesiredPath(TIP, TIP[None]), 0.0, name="p", max_row_change=STEP
 )
 
 

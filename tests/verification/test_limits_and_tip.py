@@ -31,7 +31,7 @@ def drawing(n: int = 161, laps: float = 1.0) -> tuple[PlanningProblem, Trajector
     base = np.column_stack([x0, np.zeros((n, 2))])
     centres = base[:, None] + ARM.ratios[:, None] * (tips - base)[:, None]
     alpha, theta = joint_angles(ARM, centres)
-    problem = PlanningProblem("p", ARM, Scene(), path, 0.0, np.eye(4))
+    problem = PlanningProblem(ARM, Scene(), path, 0.0, name="p")
     return problem, Trajectory(np.ones(n, bool), stations, x0, alpha, theta)
 
 
@@ -144,7 +144,7 @@ def test_a_deviation_is_what_the_tip_is_off_by_and_the_rounding(rows: int) -> No
     x0, angles, off = np.array([0.0, 0.1])[:rows], np.zeros((rows, 8)), 3e-4
     points = np.array([[ARM.total_length + x, off, 0.0] for x in x0])
     path = DesiredPath(points[0], points, required_coverage=0.0)
-    problem = PlanningProblem("p", ARM, Scene(), path, 0.0, np.eye(4))
+    problem = PlanningProblem(ARM, Scene(), path, 0.0, name="p")
     motion = Trajectory(np.ones(rows, bool), x0, x0, angles, angles)
     found = check_tip(problem, motion).deviation
     assert found == pytest.approx(off + TOLERANCES.arithmetic, abs=1e-14)
@@ -155,7 +155,7 @@ def test_a_smooth_piece_draws_only_where_all_of_it_is_near() -> None:
     x0, angles = np.array([0.0, 0.1, 0.2, 0.3]), np.zeros((4, 8))
     ends = np.array([[ARM.total_length + x, 0.0, 0.0] for x in (0.0, 0.3)])
     path = DesiredPath(ends[0], ends)
-    problem = PlanningProblem("p", ARM, Scene(), path, 0.0, np.eye(4))
+    problem = PlanningProblem(ARM, Scene(), path, 0.0, name="p")
     for rate, share in ((0.0, 1.0), (0.05, 1.0 / 3.0)):
         rates = np.zeros((4, 17))
         rates[:, 0], rates[1, 1] = 0.1, rate

@@ -105,7 +105,7 @@ def test_what_reaches_behind_its_joint_is_no_thicker_for_it() -> None:
         (joint - 0.3 - 0.4, np.hypot(0.4, 0.3) - 0.1 - 0.05),
     ):
         ball = Sphere("ball", np.array([x, 0.3, 0.0]), 0.1)
-        problem = PlanningProblem("p", arm, Scene((ball,)), None, 0.0, np.eye(4))
+        problem = PlanningProblem(arm, Scene((ball,)), None, 0.0, name="p")
         centres = np.zeros((1, arm.n_links + 1, 3))
         centres[0, :, 0] = arm.stations
         for told in (
@@ -136,7 +136,7 @@ def test_rounding_grows_with_the_largest_length_there_is(
     if name in sizes:
         sizes[name] = np.array([1.0, -largest, 2.0])
     pieces: Any = SimpleNamespace(**sizes)
-    problem = PlanningProblem("p", arm, Scene(()), None, 0.0, np.eye(4))
+    problem = PlanningProblem(arm, Scene(()), None, 0.0, name="p")
     share = max(1.0, largest / TOLERANCES.scene_extent)
     assert arithmetic_pad(problem, pieces) == share * TOLERANCES.arithmetic
 
@@ -159,7 +159,7 @@ def test_margins_are_kept_by_single_links_from_single_obstacles(
         made = trimesh.creation.box(np.full(3, 0.3))
         corners = np.asarray(made.vertices) + np.array([2.0, -0.5, 0.3])
         three[1] = Mesh("two", corners, np.asarray(made.faces))
-    problem = PlanningProblem("p", arm, Scene(tuple(three)), None, 0.0, np.eye(4))
+    problem = PlanningProblem(arm, Scene(tuple(three)), None, 0.0, name="p")
     table = np.where(rng.random((8, 3)) < 0.4, rng.uniform(0.0, 0.05, (8, 3)), 0.0)
     alone = [link_clearance(replace(problem, scene=Scene((one,)))) for one in three]
     near = np.zeros((200, 9, 3))

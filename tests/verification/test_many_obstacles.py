@@ -43,7 +43,7 @@ def cloud(seed: int, n: int = 120) -> PlanningProblem:
         boxes.append(Box(f"box{k}", np.array(centre), rotation, size))
     tip = np.array([3.126, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    return PlanningProblem("p", ARM, Scene(tuple(boxes)), path, 0.002, np.eye(4))
+    return PlanningProblem(ARM, Scene(tuple(boxes)), path, 0.002, name="p")
 
 
 def swaying(n_rows: int = 60) -> Trajectory:

@@ -51,7 +51,7 @@ def tunnel(radius: float, around: int = 24, along: int = 30) -> Mesh:
 def problem_of(mesh: Mesh, required: float = 0.0) -> PlanningProblem:
     tip = np.array([ARM.total_length, 0.0, 0.0])
     path, scene = DesiredPath(tip, tip[None]), Scene((mesh,))
-    return PlanningProblem("tunnel", ARM, scene, path, required, np.eye(4))
+    return PlanningProblem(ARM, scene, path, required, name="tunnel")
 
 
 def clearances(mesh: Mesh, rows: Trajectory, at: FloatArray) -> FloatArray:

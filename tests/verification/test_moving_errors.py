@@ -68,7 +68,7 @@ def compare(seed: int) -> None:
     carrier = Carrier(free_tree(), Path(np.hstack(knots), times=times))
     centre, radius = rng.normal(0.0, 0.1, 3), float(rng.uniform(0.02, 0.15))
     ball = Moving(Sphere("ball", centre, radius), carrier, 6)
-    problem = PlanningProblem("p", arm, Scene((ball,)), None, 0.005, np.eye(4))
+    problem = PlanningProblem(arm, Scene((ball,)), None, 0.005, name="p")
     lower = prove_clearance(problem, motion, box).least.lower[:3]
 
     moments = rng.uniform(0.0, motion.n_samples - 1, SAMPLES)

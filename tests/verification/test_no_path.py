@@ -36,7 +36,7 @@ def posture(motion: Trajectory, row: int) -> Posture:
 
 
 def asked(**ends: Posture) -> PlanningProblem:
-    return PlanningProblem("p", ARM, Scene((BALL,)), None, 0.01, np.eye(4), **ends)
+    return PlanningProblem(ARM, Scene((BALL,)), None, 0.01, name="p", **ends)
 
 
 def names(checks: tuple[Check, ...]) -> list[str]:

@@ -62,7 +62,7 @@ def asked(scene: Scene, pair: Pair, q: FloatArray) -> tuple[FloatArray, FloatArr
     """Clearances of a pair and their slopes."""
     tip = np.array([ARM.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    problem = PlanningProblem("p", ARM, scene, path, 0.0, np.eye(4))
+    problem = PlanningProblem(ARM, scene, path, 0.0, name="p")
     assembly = arm_assembly(problem)
     task = assembly.question.about(Path(q[:1])).task
     return pair_slopes(task, assembly.pairs.index(pair), q)

@@ -42,7 +42,7 @@ def motion(
 def asked(tips: FloatArray, pointing: Pointing) -> PlanningProblem:
     """The problem to draw the polyline through some tips."""
     path = DesiredPath(tips[0], tips, pointing=pointing)
-    return PlanningProblem("test", ARM, Scene(()), path, 0.0, np.eye(4))
+    return PlanningProblem(ARM, Scene(()), path, 0.0, name="test")
 
 
 def sampled(task: PlanningProblem, told: Trajectory, count: int) -> FloatArray:
@@ -113,7 +113,7 @@ def test_a_swing_between_two_rows_is_seen() -> None:
         tips[0], np.array([[0.0, 0, 0], [0.1, 0, 0]]),
         pointing=Pointing(0.2, directions=np.eye(3)[:1]),
     )  # fmt: skip
-    task = PlanningProblem("test", ARM, Scene(()), path, 0.0, np.eye(4))
+    task = PlanningProblem(ARM, Scene(()), path, 0.0, name="test")
     row = the_row(task, told)
     assert (row.verdict, row.moment) == (Verdict.REFUTED, 1.0)
     assert row.worst == pytest.approx(0.3, abs=1e-12)
@@ -298,7 +298,7 @@ def test_a_cone_is_kept_to_the_tolerance_of_angles(angle: float, rows: int) -> N
     for share, verdict in ((-0.5, "certified"), (0.5, "certified"), (1.5, "refuted")):
         cone = angle - share * TOLERANCES.joint_limit
         path = DesiredPath(tip, tip[None], pointing=Pointing(cone, directions=look))
-        problem = PlanningProblem("p", ARM, Scene(()), path, 0.0, np.eye(4))
+        problem = PlanningProblem(ARM, Scene(()), path, 0.0, name="p")
         row = the_row(problem, rest)
         assert row.verdict.value == verdict
         assert row.worst == pytest.approx(angle, abs=1e-11)

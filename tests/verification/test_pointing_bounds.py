@@ -59,7 +59,7 @@ def random_motion(
     motion = Trajectory(
         on, stations, joints[:, 0], joints[:, 1::2], joints[:, 2::2], **more
     )
-    return PlanningProblem("p", ARM, Scene(), path, 0.0, np.eye(4)), motion
+    return PlanningProblem(ARM, Scene(), path, 0.0, name="p"), motion
 
 
 def expected_intervals(on: Any) -> list[tuple[int, int]]:

@@ -97,7 +97,7 @@ def test_each_row_says_how_much_of_what_was_looked_at_against_which_limit() -> N
     }
     needed |= {"max_row_change": 0.2, "tip_tolerance": 1e-5}
     arm = built_in("hrm8")
-    problem = PlanningProblem("p", arm, Scene((crate,)), path, 0.0, np.eye(4))
+    problem = PlanningProblem(arm, Scene((crate,)), path, 0.0, name="p")
     problem = replace(problem, **needed)
     x0 = np.linspace(0.0, 0.4, 41)
     motion = Trajectory(np.ones(41, bool), x0, x0, *np.zeros((2, 41, 8)))

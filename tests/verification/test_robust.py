@@ -37,7 +37,7 @@ REQUIRED = 0.003
 def asked(radius: float) -> PlanningProblem:
     point = np.array([3.126, 0.0, 0.0])
     path, ball = DesiredPath(point, point[None]), Sphere("ball", CENTRE, radius)
-    return PlanningProblem("p", ARM, Scene((ball,)), path, REQUIRED, np.eye(4))
+    return PlanningProblem(ARM, Scene((ball,)), path, REQUIRED, name="p")
 
 
 def swaying(n_rows: int) -> Trajectory:
@@ -139,9 +139,8 @@ def test_a_motion_that_fails_at_one_place_survives_nothing() -> None:
 def test_nothing_in_the_way_is_looked_at_up_to_a_limit() -> None:
     point = np.array([3.126, 0.0, 0.0])
     free = PlanningProblem(
-        "free", built_in("hrm8"), Scene(), DesiredPath(point, point[None]), 0.0,
-        np.eye(4),
-    )  # fmt: skip
+        built_in("hrm8"), Scene(), DesiredPath(point, point[None]), 0.0, name="free"
+    )
     found = largest_joint_error(free, swaying(20), ErrorBox())
     assert 0.0 < found <= LARGEST
     assert is_certified(free, swaying(20), ErrorBox(joint=found))

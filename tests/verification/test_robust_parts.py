@@ -91,7 +91,7 @@ def scene(count: int) -> PlanningProblem:
     """Balls that nobody looks at, and a box that may turn."""
     balls = [Sphere(f"ball {k}", np.full(3, 9.0), 0.1) for k in range(count - 1)]
     box = Box("box", np.full(3, 9.0), np.eye(3), np.array([1.0, 2.0, 2.0]))
-    return PlanningProblem("p", ARM, Scene((*balls, box)), None, 0.01, np.eye(4))
+    return PlanningProblem(ARM, Scene((*balls, box)), None, 0.01, name="p")
 
 
 def test_what_no_error_brings_near_is_left_out() -> None:

@@ -54,7 +54,7 @@ def random_motion(
     angles = moves[keep, 1::2], moves[keep, 2::2]
     motion = Trajectory(on, stations, moves[keep, 0], *angles, **more)
     tolerance = {"tip_tolerance": max(off, 1e-9)}
-    return PlanningProblem("p", ARM, Scene(), path, 0.0, np.eye(4), **tolerance), motion
+    return PlanningProblem(ARM, Scene(), path, 0.0, name="p", **tolerance), motion
 
 
 def seen_deviation(problem: PlanningProblem, motion: Trajectory) -> np.ndarray:

@@ -112,7 +112,7 @@ def test_coal_loads_every_triangle(loaded: int) -> None:
 
 
 def test_a_motion_of_another_arm_is_refused() -> None:
-    problem = PlanningProblem("p", built_in("hrm8"), Scene(), None, 0.0, np.eye(4))
+    problem = PlanningProblem(built_in("hrm8"), Scene(), None, 0.0, name="p")
     for links in (7, 9):
         still, rows = np.zeros(2), np.zeros((2, links))
         motion = Trajectory(still > 0, still, still, rows, rows)

@@ -53,14 +53,15 @@ class PlanningProblem(AnyProblem, ByValue):
     """All the planner may read, in the base frame: x along the rail.
 
     Args:
-        name: Name for reports and folders.
         manipulator: The arm.
         scene: The obstacles.
         tip_path: What the tip shall draw, and from where; None where it shall draw
             nothing: clearance, limits, start and goal are asked for, no more.
         required_clearance: Least distance between surfaces; [m].
+        name: Name for reports and folders.
         T_world_base: Pose of the base frame in the user's frame, shape (4, 4), [m] in
             its last column; readers and writers apply it, nobody else needs it.
+            Default: at the origin.
         required_self_clearance: Least distance between the surfaces of two links that
             are not neighbours; [m].
         tip_tolerance: How far the tip may be off its start, its goal and, at waypoints,
@@ -82,12 +83,12 @@ class PlanningProblem(AnyProblem, ByValue):
             not fit the arm, or a start or goal stands beside a tip path.
     """
 
-    name: str
     manipulator: Manipulator
     scene: Scene
     tip_path: DesiredPath | None
     required_clearance: float
-    T_world_base: FloatArray
+    name: str = "problem"
+    T_world_base: FloatArray = field(default_factory=lambda: np.eye(4))
     required_self_clearance: float = 0.0
     tip_tolerance: float = TOLERANCES.tip_on_path
     max_row_change: float | None = None

@@ -40,7 +40,7 @@ def problem(
         start_joints=start_joints,
     )  # fmt: skip
     scene = Scene(tuple(obstacles))
-    return PlanningProblem("test", built_in("hrm8"), scene, path, 0.0035, np.eye(4))
+    return PlanningProblem(built_in("hrm8"), scene, path, 0.0035, name="test")
 
 
 def straight_arm(task: PlanningProblem, tips: FloatArray) -> FloatArray:

@@ -800,7 +800,7 @@ def test_a_short_rail_is_served_by_a_swing_round_it() -> None:
     goal = np.array([1.9, 0.3, 1.9])
     points = np.stack([goal, goal + 0.1])
     path = DesiredPath(np.array([3.126, 0.0, 0.0]), points)
-    task = PlanningProblem("swing", rail, Scene(()), path, 0.0035, np.eye(4))
+    task = PlanningProblem(rail, Scene(()), path, 0.0035, name="swing")
     space = space_of(task)
     (route,) = space.swing(goal)
     np.testing.assert_array_equal(route[[0, -1]], [path.start, goal])

@@ -37,7 +37,7 @@ def asked(side: float, y: float, errors: ErrorBox) -> PlanningProblem:
     points = np.array([[3.0, y, 0.0], [3.0, y + 0.1, 0.2]])
     path = DesiredPath(np.array([2.6, 0.0, 0.0]), points)
     arm, scene = with_cameras(side), Scene((WALL,))
-    return PlanningProblem("cameras", arm, scene, path, 0.004, np.eye(4), errors=errors)
+    return PlanningProblem(arm, scene, path, 0.004, name="cameras", errors=errors)
 
 
 @pytest.mark.parametrize(("side", "y"), [(1.0, 0.6), (1.0, 0.8), (-1.0, 1.0)])

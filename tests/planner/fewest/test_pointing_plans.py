@@ -150,9 +150,7 @@ def test_a_camera_looks_through_a_window_within_the_errors(
         pointing=pointing, blocked=Blocked.FAIL,
     )  # fmt: skip
     errors = ErrorBox(joint=float(np.deg2rad(joint_deg)))
-    task = PlanningProblem(
-        "look", arm, Scene(WINDOW), path, 0.0035, np.eye(4), errors=errors
-    )
+    task = PlanningProblem(arm, Scene(WINDOW), path, 0.0035, name="look", errors=errors)
     found = planned(task)
     assert found.verification.verdict is Verdict.CERTIFIED
     (row,) = [check for check in found.verification.checks if check.name == NAME]
