@@ -6,7 +6,7 @@ plan. A limit ends them, and puts proofs off.
 
 import itertools
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, TypeAlias
@@ -172,13 +172,13 @@ class _Exploration:
         weights: CostWeights,
         effort: Effort,
     ) -> None:
+        self.problem, self.clearance, self.margin = problem, clearance, margin
         self.weights, self.levels = weights, effort.levels
-        self.judges = _Judges(problem, clearance, margin, weights)
-        self.spaces = _Spaces(problem, clearance, margin)
+        self.spaces: dict[tuple[float, float, int], TipSpace] = {}
         self.rows, self.room = path_rows(problem.path), Room(0.0, 0.0)
         self.bare = clearance.bare  # nothing is impossible for a margin
         self.proof = prove_tips(held_from(problem, TIP_ONLY), self.bare, self.rows.tips)
-        first = self.judges.of(self.levels[0])
+        first = self._judge(self.levels[0])
         self.best = Explored(first, None, self.rows, self.proof)
         self.proofs: tuple[Proving, ...] = (_CutOff(self.best), _hemmed_in)
         self.proofs = self.proofs if effort.proves else ()
@@ -221,11 +221,11 @@ class _Exploration:
 
     def _searched(self, level: Level, soon: Deadline) -> Explored:
         """What one level comes to."""
-        judge, stuck = self.judges.of(level), self.best.stuck
+        judge, stuck = self._judge(level), self.best.stuck
         now = Explored(judge, None, self.rows, self.proof, stuck)
         try:
             if isinstance(level, Insert):
-                now = _inserted(now, self.spaces.of(level), level, soon)
+                now = _inserted(now, self._space(level), level, soon)
             elif isinstance(level, Search):
                 found, self.room = _look(
                     judge, level, self.rows, self.proof, self.weights
@@ -250,12 +250,48 @@ class _Exploration:
 
     def _prove(self, level: Level) -> None:
         """Ask whether it can be done at all: seldom needed, so only after a search."""
-        space = self.spaces.of_first((level, *self.levels))
+        inserts = [one for one in (level, *self.levels) if isinstance(one, Insert)]
+        space = self._space(inserts[0]) if inserts else None
         with suppress(OutOfTime):  # it goes on after the next level
             clearance = self.bare.hurried(PROOF_SHARE)
             self.best = self.proofs[0](clearance, self.best, space)
             self.proofs = self.proofs[1:]
         self.proof = self.best.proof.take(self.best.rows.as_stated)
+
+    def _judge(self, level: Level) -> Judge:
+        """The judge of a level."""
+        arm, weights = self.problem.manipulator, self.weights
+        margins = link_margins(arm, weights.joint_error)
+        # The way out of a start that is bent more than is liked must be allowed.
+        bent = largest_start_angle(self.problem) + TOLERANCES.joint_limit
+        least_ease = min(1.0, bent / link_limit(self.problem))
+        worth = self.problem.required_clearance + self.margin
+        worth += (level.slack + weights.clearance) * arm.total_length
+        worth += 0.0 if margins is None else float(margins[-1])
+        return Judge(
+            self.problem,
+            self.clearance,
+            self.margin,
+            level.slack * arm.total_length,
+            level.finest * arm.total_length,
+            max(level.ease, least_ease),
+            rough=self.clearance.up_to(worth),
+            link_margins=margins,
+        )
+
+    def _space(self, level: Insert) -> TipSpace:
+        """Ways of the tip, kept for insertions that look as finely."""
+        key = level.slack, level.step, level.cells
+        if key not in self.spaces:
+            length = self.problem.manipulator.total_length
+            required = self.problem.required_clearance + self.margin
+            required += level.slack * length
+            # Where it is least blocked tells where to look for a hole.
+            exact = replace(self.clearance, floor=-np.inf)
+            self.spaces[key] = TipSpace(
+                self.problem, exact, required, level.step * length, level.cells
+            )
+        return self.spaces[key]
 
 
 class Room(NamedTuple):
@@ -276,84 +312,6 @@ class Room(NamedTuple):
     def one_knee_draws(self) -> bool:
         """Whether arms with one knee stand along most of the path."""
         return self.on_path >= ONE_KNEE_DRAWS
-
-
-class _Judges:
-    """Judges of levels.
-
-    Args:
-        problem: What is asked.
-        clearance: The clearance function.
-        margin: Kept beyond the required clearance; [m].
-        weights: What the strategy prefers.
-    """
-
-    def __init__(
-        self,
-        problem: PlanningProblem,
-        clearance: BroadPhase,
-        margin: float,
-        weights: CostWeights,
-    ) -> None:
-        self.problem, self.clearance, self.margin = problem, clearance, margin
-        self.link_margins = link_margins(problem.manipulator, weights.joint_error)
-        self.reserve = weights.clearance
-        # The way out of a start that is bent more than is liked must be allowed.
-        bent = largest_start_angle(problem) + TOLERANCES.joint_limit
-        self.least_ease = min(1.0, bent / link_limit(problem))
-
-    def of(self, level: Level) -> Judge:
-        """That of one level."""
-        length, margins = self.problem.manipulator.total_length, self.link_margins
-        worth = self.problem.required_clearance + self.margin
-        worth += (level.slack + self.reserve) * length
-        worth += 0.0 if margins is None else float(margins[-1])
-        return Judge(
-            self.problem,
-            self.clearance,
-            self.margin,
-            level.slack * length,
-            level.finest * length,
-            max(level.ease, self.least_ease),
-            rough=self.clearance.up_to(worth),
-            link_margins=margins,
-        )
-
-
-class _Spaces:
-    """Ways of the tip, kept for insertions that look as finely.
-
-    Args:
-        problem: What is asked.
-        clearance: The clearance function.
-        margin: Kept beyond the required clearance; [m].
-    """
-
-    def __init__(
-        self, problem: PlanningProblem, clearance: BroadPhase, margin: float
-    ) -> None:
-        self.problem, self.clearance, self.margin = problem, clearance, margin
-        self.known: dict[tuple[float, float, int], TipSpace] = {}
-
-    def of(self, level: Insert) -> TipSpace:
-        """Those for an insertion."""
-        key = level.slack, level.step, level.cells
-        if key not in self.known:
-            length = self.problem.manipulator.total_length
-            required = self.problem.required_clearance + self.margin
-            required += level.slack * length
-            # Where it is least blocked tells where to look for a hole.
-            exact = replace(self.clearance, floor=-np.inf)
-            self.known[key] = TipSpace(
-                self.problem, exact, required, level.step * length, level.cells
-            )
-        return self.known[key]
-
-    def of_first(self, levels: Iterable[Level]) -> TipSpace | None:
-        """Those for the first insertion among some levels; None without one."""
-        inserts = (level for level in levels if isinstance(level, Insert))
-        first = next(inserts, None)
-        return None if first is None else self.of(first)
 
 
 def _leads_there(space: TipSpace, outcome: Explored) -> bool:

@@ -169,9 +169,8 @@ def dense_rows(
 def _cut(rows: Rows, parts: IntArray) -> tuple[IntArray, FloatArray]:
     """Places of rows with each step cut evenly into so many parts, shape (r - 1,)."""
     ends = np.where(np.diff(rows.interval) > 0, 1.0, rows.share[1:])
-    step = np.repeat(np.arange(len(parts)), parts)
-    number = np.arange(len(step)) - (np.cumsum(parts) - parts)[step]
-    share = rows.share[step] + number / parts[step] * (ends - rows.share[:-1])[step]
+    step, part = (places[:-1] for places in spread(parts))
+    share = rows.share[step] + part * (ends - rows.share[:-1])[step]
     return (
         np.append(rows.interval[step], rows.interval[-1]),
         np.append(share, rows.share[-1]),

@@ -12,6 +12,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, freeze
 from vdsm_pin.planner.records import TipPath
+from vdsm_pin.planner.spacing import spread
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -219,9 +220,7 @@ def subdivided(path: DesiredPath, route: Route, pieces: IntArray) -> Route:
         pieces: Into how many pieces each interval is cut, shape (n_samples - 1,).
     """
     tip = route.tip_path
-    interval = np.repeat(np.arange(len(pieces)), pieces)
-    firsts = np.cumsum(pieces) - pieces
-    part = (np.arange(len(interval)) - firsts[interval]) / pieces[interval]
+    interval, part = (places[:-1] for places in spread(pieces))
     begin, end = np.append(interval, len(pieces)), np.append(interval + 1, len(pieces))
     part = np.append(part, 0.0)
     points = tip.points[begin] + part[:, None] * (tip.points[end] - tip.points[begin])
