@@ -16,6 +16,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from math import log, nan
 from pathlib import Path
+from typing import Any
 
 import coal
 import numpy as np
@@ -24,12 +25,17 @@ from benchmarks.common import surroundings, timed
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.solids import Cylinder, Mesh, Sphere
+from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.geometry.solids import Box, Cylinder, Mesh, Sphere
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.paths import Path as JointPath
+from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.tree import Joint, Kind, Tree, shifted
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 
 ARM = built_in("hrm8")
@@ -223,6 +229,60 @@ def headline(repeat: int = 20) -> Row:
     return bars("headline", 24, repeat)
 
 
+REACHES = ((0.0, 0.09), (0.425, 0.0), (0.392, 0.0), (0.0, 0.109), (0.095, 0.0))
+"""Of links 2 to 6 of a tree such as a UR5: along x and z from joint to joint; [m]."""
+
+BOXES = 12
+
+
+def tree_of_hulls(n_intervals: int = 10_000) -> tuple[Any, ...]:
+    """What `prove` takes: 6 joints with hulls of 50 corners, which sway among boxes."""
+    rng = np.random.default_rng(0)
+    y, z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    places = [shifted(0.0, 0.0, 0.1), *(shifted(x, 0.0, up) for x, up in REACHES)]
+    axes = (z, y, y, y, z, y)
+    joints = [
+        Joint(k, Kind.REVOLUTE, axis, place, column=k)
+        for k, (axis, place) in enumerate(zip(axes, places, strict=True))
+    ]
+    bodies = []
+    for k, (x, up) in enumerate((*REACHES, (0.08, 0.0))):
+        corners = rng.normal(size=(50, 3))
+        corners *= 0.06 / np.linalg.norm(corners, axis=1)[:, None]
+        ends = rng.integers(0, 2, 50)[:, None] * np.array([x, 0.0, up])
+        bodies.append(Body(k + 1, (Hull(corners + ends),)))
+    turn = 2.0 * np.pi * np.arange(BOXES) / BOXES
+    for a in turn:  # a ring that the arm sways within
+        centre = np.array([1.1 * np.cos(a), 1.1 * np.sin(a), 0.1])
+        bodies += [Body(0, Box("box", centre, np.eye(3), np.full(3, 0.1)).pieces)]
+    t = np.linspace(0.0, 2.0 * np.pi, n_intervals + 1)[:, None]
+    rows = 0.5 * np.sin(t + rng.uniform(0.0, 6.0, 6)) + np.array([0, -1, 1, 0, 0, 0])
+    pairs = [Pair(k, 6 + b) for k in range(6) for b in range(BOXES)]
+    pairs += [Pair(i, j) for i in range(6) for j in range(i + 3, 6)]
+    return Tree(tuple(joints)), bodies, JointPath(rows), pairs
+
+
+def robot(repeat: int = 20) -> Row:
+    """A robot's tree: 10,000 intervals, 72 pairs with boxes and 6 of its own."""
+    asked, proofs = tree_of_hulls(), list[Proof]()
+
+    def judge() -> None:
+        proofs[:] = [prove(*asked)]
+
+    seconds, (proof,) = timed(judge, repeat), proofs
+    return Row(
+        table="robot",
+        size=6,
+        intervals=asked[2].n_intervals,
+        pairs=len(asked[3]),
+        triangles=0,
+        clearance_mm=float(proof.upper.min()) / MM,
+        not_certified=int(proof.counts[:, 1:].sum()),
+        cpu_ms=1e3 * seconds["median"],
+        p95_ms=1e3 * seconds["p95"],
+    )
+
+
 def certify_growth(repeat: int = 5, quick: bool = False) -> list[Row]:
     """The tables: what grows, and the time.
 
@@ -310,7 +370,7 @@ def main() -> int:
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--quick", action="store_true", help="without the largest")
     options = parser.parse_args()
-    rows = [headline(max(20, options.repeat))]
+    rows = [headline(max(20, options.repeat)), robot(max(20, options.repeat))]
     rows += certify_growth(options.repeat, options.quick)
     peer = sampled_by_coal()
     print(as_markdown(rows))
