@@ -23,11 +23,12 @@ from vdsm_pin.planner.fewest.roadmap_kernels import (
     FROM_START,
     Barred,
     Labels,
+    TipLinks,
     Weights,
+    shortest_paths,
     stage_programme,
 )
 from vdsm_pin.planner.fewest.route import TipRoute
-from vdsm_pin.planner.fewest.shortest_paths import TipLinks, shortest_paths
 from vdsm_pin.problem.desired_path import Order
 
 WEIGHTS = Weights(
