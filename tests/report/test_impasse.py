@@ -1,5 +1,6 @@
 """Where a search ended. Oracles: the error's own facts, forward kinematics."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import made_up
@@ -17,6 +18,7 @@ from vdsm_pin.errors import (
     StartBlocked,
     VdsmError,
 )
+from vdsm_pin.problem.planning_problem import Posture
 from vdsm_pin.report.html import write_no_plan
 from vdsm_pin.report.impasse import Impasse, impasse_of
 
@@ -33,6 +35,19 @@ SOMEWHERE: list[VdsmError] = [
 def tip_of(place: Impasse) -> np.ndarray:
     arm, rows = made_up.problem().manipulator, place.arm
     return np.asarray(joint_centres(arm, rows.x0, rows.alpha, rows.theta)[0, -1])
+
+
+def test_a_goal_that_was_not_reached_is_marked(tmp_path: Path) -> None:
+    problem = made_up.problem()
+    tip, begin = np.array([1.0, 0.2, 0.1]), Posture(problem.path.start)
+    asked = replace(problem, tip_path=None, start=begin, goal=Posture(tip))
+    for error in SOMEWHERE:
+        place = impasse_of(asked, error)
+        assert place.station is None
+        np.testing.assert_array_equal(place.tip, tip)
+    page = tmp_path / "no_plan.html"
+    write_no_plan(page, asked, SOMEWHERE[0], "fewest", made_up.RECORD)
+    assert "a ring marks the goal" in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("error", SOMEWHERE, ids=lambda one: type(one).__name__)

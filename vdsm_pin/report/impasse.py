@@ -20,7 +20,8 @@ class Impasse:
             where it could be so, else as it starts; one row.
         posture: Which of them: "where it came farthest", "straight" or "as it starts".
         station: Along the desired path; None where nobody knows; [m].
-        tip: The place itself, base frame, shape (3,); None where nobody knows; [m].
+        tip: The place itself, or the goal, base frame, shape (3,); None where nobody
+            knows; [m].
         link: Of the arm shown, the one that is nearest to an obstacle, from 1; 0 where
             nobody knows.
         obstacle: Name of the obstacle that is in the way; empty where nobody knows.
@@ -45,7 +46,11 @@ def impasse_of(problem: PlanningProblem, error: VdsmError) -> Impasse:
     station: float | None = getattr(error, "station", known)
     link: int = getattr(error, "link", reached.link if reached else 0)
     obstacle: str = getattr(error, "obstacle", reached.obstacle if reached else "")
-    tip = None if station is None else problem.path.at(np.array([station]))[0]
+    path, tip = problem.tip_path, None
+    if path is None:  # a goal: what a search calls its path is one point
+        station, tip = None, None if problem.goal is None else problem.goal.tip
+    elif station is not None:
+        tip = path.at(np.array([station]))[0]
     arm, posture = _arm(problem, reached, tip)
     narrowest = tuple(reached.narrowest) if reached else ()
     return Impasse(arm, posture, station, tip, link, obstacle, narrowest)
