@@ -183,10 +183,12 @@ def how_far(
         if skipped:
             station, stop = route.stations[skipped[0] - 1 : skipped[0] + 1].tolist()
             tip = route.tips[route.layers[skipped[0]]]
+    length, place = problem.path.length, problem.in_file(tip)
     words = (
-        f"drew {in_mm(drawn)} of {in_mm(problem.path.length)}; the first stretch not "
-        f"drawn begins at {in_mm(problem.path.within(station))} along the path, tip "
-        f"{problem.in_file(tip)}"
+        f"drew {in_mm(drawn)} of {in_mm(length)}; the first stretch not drawn begins "
+        f"at {in_mm(problem.path.within(station))} along the path, tip {place}"
+        if length > 0.0
+        else f"the tip did not reach {place}"
     )
     rows = outcome.rows.tips[(stations >= station) & (stations <= stop)]
     cause = _seen(problem, outcome, clearance, rows) or at_reach(problem, rows)

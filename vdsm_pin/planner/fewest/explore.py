@@ -43,6 +43,7 @@ from vdsm_pin.planner.path_rows import PathRows, path_rows, rolled
 from vdsm_pin.planner.upper_clearance import TIP_ONLY, held_from, last_link
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -364,7 +365,10 @@ def _once_inserted(
 ) -> Explored:
     undrawable = before.proof.undrawable
     found, stuck = insert(before.judge, space, before.rows, undrawable, level, soon)
-    return replace(before, found=found, stuck=stuck or before.stuck)
+    if stuck is None or (before.stuck and before.stuck.part >= stuck.part):
+        return replace(before, found=found)
+    say("an arm came %.0f %% of a way in", 100.0 * stuck.part)
+    return replace(before, found=found, stuck=stuck)
 
 
 Proving: TypeAlias = Callable[[BroadPhase, Explored, TipSpace | None], Explored]

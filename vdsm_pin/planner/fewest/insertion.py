@@ -29,9 +29,7 @@ from vdsm_pin.planner.spacing import stepped
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.planner.tip_curve import led_along, way_back
 from vdsm_pin.problem.desired_path import Blocked
-from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.units import in_mm
 
 TIP_TOLERANCE: Final = 0.3
 """How far the tip may be from its way off the path, over the body's radius; [-]."""
@@ -172,12 +170,6 @@ class _Visits:
                 self.farthest = visit
             if best is None or visit.last > best.last:
                 best = visit
-            reached, part = visit.come
-            stations = self.judge.problem.path.wrapped(self.route.stations)
-            say(
-                "an arm came %.0f %% of a way in, to %s along the path", 100.0 * part,
-                in_mm(float(stations[reached]) if reached >= 0 else 0.0),
-            )  # fmt: skip
             if best.last == k + len(path) - 1:
                 break
             if best.last < k:

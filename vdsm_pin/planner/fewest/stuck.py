@@ -67,6 +67,10 @@ AT_REACH: Final = 0.9995
 """Part of the arm's length from which on a path is too far from the rail; [-]."""
 
 
+LONGER_RAIL: Final = "a longer rail (`base_range`)"
+"""What might help a base at an end of its rail."""
+
+
 @dataclass(frozen=True)
 class Stuck:
     """The insertion that came farthest.
@@ -81,6 +85,11 @@ class Stuck:
     route: FloatArray
     come: int
     centres: FloatArray
+
+    @property
+    def part(self) -> float:
+        """Part of the way in that the arm has come; [-]."""
+        return self.come / len(self.route)
 
 
 def where_stuck(
@@ -107,7 +116,7 @@ def where_stuck(
     parts.append(follower.words)
     tight = width <= SNUG * _needed(problem)
     advice = _advice(problem, stuck, tight, follower.advice)
-    parts.append(f"try {' or '.join(advice)}")
+    parts.append(f"try {', or '.join(advice)}")
     link, obstacle = (found.link, found.obstacle) if found else (0, "")
     words, centres = "; ".join(parts), stuck.centres.tolist()
     return Reached(words, 0.0, link, obstacle, centres, narrowest)
@@ -176,7 +185,7 @@ def _broken(problem: PlanningProblem, centres: FloatArray) -> Iterator[tuple[str
     if not low <= base <= high:
         rail = f"from {in_mm(low)} to {in_mm(high)}"
         words = f"need its base at x0 = {in_mm(base)}, and the rail is {rail},"
-        yield words, "a longer rail (`base_range`)"
+        yield words, LONGER_RAIL
     found = culprit(problem, centres) if problem.scene.obstacles else None
     if found and found.clearance < problem.required_clearance:
         obstacle, link = repr(found.obstacle), named(arm, found.link)
@@ -305,14 +314,14 @@ def _advice(
     arm, tried = problem.manipulator, []
     base, (low, high) = float(stuck.centres[0, 0]), arm.base_range
     if min(base - low, high - base) <= AT_END * arm.total_length:
-        tried.append("a longer rail (`base_range`), the base is at its end")
+        tried.append(f"{LONGER_RAIL}, since the base is at its end")
     bends = bends_of(stuck.centres[None])[0]
     if bends.max() >= AT_LIMIT * arm.max_link_angle:
         joint = int(np.argmax(bends)) + 1
-        tried.append(f"larger joint limits, joint {joint} is at its own")
+        tried.append(f"larger joint limits, since joint {joint} is at its own")
     if tight:
         tried.append("a smaller `required_clearance` or a wider opening")
-    if follower:
+    if follower and not any(one.startswith(follower) for one in tried):
         tried.append(follower)
     return [*tried, "another start", "a longer time limit"]
 
