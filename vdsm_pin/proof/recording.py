@@ -35,6 +35,17 @@ LOSS: Final = 1e-5
 """What a plane may prove less for the sake of fewer digits; [m]."""
 
 
+def by_all_corners(task: Task) -> Task:
+    """The task without rough versions of pairs, as `record` takes it.
+
+    Whoever checks a plane counts all corners. Over a slice they may prove less than few
+    of them do, less what those miss: the plane is the best one of where corners are at
+    the ends, not of how far each of them swings in between.
+    """
+    rough = np.full_like(task.pairs.rough, -1)
+    return task._replace(pairs=task.pairs._replace(rough=rough))
+
+
 @compiled
 def _claim(
     task: Task, work: Workspace, row: FloatArray, node: int, n: FloatArray
@@ -198,7 +209,7 @@ def record(
     """Write the planes of the intervals [first, last) and all pairs.
 
     Args:
-        task: The scene, pairs and rules.
+        task: The scene, pairs and rules, no pair with a rough version.
         motion: Rows of joint values.
         work: Working space; what the pairs remember is carried on.
         first: First interval.
