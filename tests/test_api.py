@@ -52,13 +52,25 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
     assert not {"numpy", "pydantic", "numba", "pinocchio"} & set(ended.stdout.split())
 
 
-def test_the_examples_do_what_they_say(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", vp.__all__)
+def test_every_name_has_an_example_that_does_what_it_says(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    found = doctest.testmod(api)
-    assert found.attempted > 15
-    assert found.failed == 0
+    named = getattr(vp, name)
+    known = {**vars(sys.modules[named.__module__]), "np": np, "vp": vp}
+    finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner()
+    for one in finder.find(named, name, globs=known):
+        runner.run(one)
+    assert runner.tries > 0
+    assert runner.failures == 0
+
+
+def test_the_example_of_the_module_does_what_it_says() -> None:
+    runner = doctest.DocTestRunner()
+    (one,) = doctest.DocTestFinder(recurse=False).find(api, "api")
+    runner.run(one)
+    assert runner.tries > 3 and runner.failures == 0
 
 
 ARM = vp.Manipulator(

@@ -437,6 +437,10 @@ def write_trajectory(
     Raises:
         InvalidInput: If it is of a robot, and no problem is given.
         InvalidFile: If the file cannot be written.
+
+    Example:
+        >>> made = plan(read_problem("paper/free"), strategy="paper")
+        >>> write_trajectory("out/api/free_again.csv", made.trajectory)
     """
     if problem is None:
         how = "plan(problem).trajectory; or with problem=, of a robot"

@@ -44,6 +44,13 @@ class VdsmError(Exception):
         notes: What was found of the problem, told before the message.
         more: What else is known of the work that failed, told after the message.
         page: A page that was written and tells more.
+
+    Example:
+        >>> try:
+        ...     vp.read_problem("no/such.yaml")
+        ... except vp.VdsmError as error:
+        ...     print(type(error).__name__)
+        InvalidFile
     """
 
     heading: str = ""
@@ -58,7 +65,15 @@ class VdsmError(Exception):
 
 
 class InvalidInput(VdsmError):
-    """An input breaks its contract."""
+    """An input breaks its contract.
+
+    Example:
+        >>> try:
+        ...     vp.ErrorBox(base_mm=-1.0)
+        ... except vp.InvalidInput as error:
+        ...     print(error)
+        base error is -0.001 m, expected 0 or more
+    """
 
 
 class InvalidFile(InvalidInput):
@@ -172,7 +187,17 @@ class Reached:
 
 
 class Infeasible(VdsmError):
-    """The problem is well-formed and this method has no plan for it."""
+    """The problem is well-formed and this method has no plan for it.
+
+    Example:
+        >>> problem, far = vp.read_problem("paper/free"), np.array([[9.0, 9.0, 9.0]])
+        >>> arm, path = problem.manipulator, vp.DesiredPath(problem.path.start, far)
+        >>> try:
+        ...     vp.plan(vp.Problem(arm, vp.Scene(), path, 0.0))
+        ... except vp.Infeasible:
+        ...     print("nobody reaches that far")
+        nobody reaches that far
+    """
 
 
 class OutOfReach(Infeasible):

@@ -16,6 +16,10 @@ class CableLayout(ByValue):
         hole_radius: Radius r of the circle of cable holes; [m].
         half_gap: Distance d from a joint centre to the link's end face; [m].
         hole_angles: phi of the holes a, b, c of each link, shape (N, 3); [rad].
+
+    Example:
+        >>> vp.CableLayout(0.02, 0.01, np.radians([[0.0, 120.0, 240.0]])).hole_radius
+        0.02
     """
 
     hole_radius: float

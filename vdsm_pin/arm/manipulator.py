@@ -54,6 +54,13 @@ class Manipulator(ByValue):
 
     Raises:
         InvalidInput: If a value breaks its range.
+
+    Example:
+        >>> holes = vp.CableLayout(0.02, 0.01, np.radians([[0.0, 120.0, 240.0]] * 3))
+        >>> lengths, rail = np.full(3, 0.3), (-1.0, 1.0)
+        >>> arm = vp.Manipulator("three", lengths, 0.03, 0.7, 0.7, rail, holes)
+        >>> round(float(arm.total_length), 9)
+        0.9
     """
 
     name: str
@@ -359,6 +366,10 @@ def built_in(name: str) -> Manipulator:
 
     Raises:
         UnknownName: If there is none.
+
+    Example:
+        >>> vp.built_in("hrm8").n_links
+        8
     """
     if name not in BUILT_IN:
         raise UnknownName(kind="manipulator", name=name, known=tuple(BUILT_IN))

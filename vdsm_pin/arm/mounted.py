@@ -36,11 +36,21 @@ class _Extension:
 
 
 class Tool(_Extension):
-    """A straight extension of the last link; its end draws the path."""
+    """A straight extension of the last link; its end draws the path.
+
+    Example:
+        >>> vp.Tool(length=0.05, radius=0.004).length
+        0.05
+    """
 
 
 class Feed(_Extension):
-    """What pushes the arm along its rail: from O_1 backwards, moved by x0 alone."""
+    """What pushes the arm along its rail: from O_1 backwards, moved by x0 alone.
+
+    Example:
+        >>> vp.Feed(length=1.2, radius=0.03).radius
+        0.03
+    """
 
 
 BodySolid: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | Mesh
@@ -55,6 +65,11 @@ class LinkBody:
         link: The link, 1 to N.
         solid: Any of `BodySolid`.
         parts: Hulls that a mesh is covered by, 1 or more.
+
+    Example:
+        >>> camera = vp.Sphere("camera", np.array([0.1, 0.0, 0.03]), 0.01)
+        >>> vp.LinkBody(3, camera).name
+        'camera'
     """
 
     link: int

@@ -123,6 +123,10 @@ class Sphere(NamedSolid):
     Args:
         centre: Shape (3,); [m].
         radius: [m].
+
+    Example:
+        >>> vp.Sphere("ball", np.array([1.0, 0.5, 0.0]), 0.1).radius
+        0.1
     """
 
     centre: FloatArray
@@ -172,6 +176,11 @@ class Capsule(_Axial):
         axis: Unit vector, shape (3,); [-].
         half_length: Half the distance between the centres of its ends; [m].
         radius: [m].
+
+    Example:
+        >>> rod = vp.Capsule("rod", np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.5, 0.02)
+        >>> rod.corners.shape
+        (2, 3)
     """
 
     @cached_property
@@ -188,6 +197,11 @@ class Cylinder(_Axial):
         axis: Unit vector, shape (3,); [-].
         half_length: Half the height; [m].
         radius: [m].
+
+    Example:
+        >>> up = np.array([0.0, 0.0, 1.0])
+        >>> vp.Cylinder("pillar", np.array([1.5, 0.4, 0.0]), up, 2.0, 0.1).half_length
+        2.0
     """
 
     @cached_property
@@ -204,6 +218,11 @@ class Box(NamedSolid):
         centre: Shape (3,); [m].
         rotation: R_base_box, shape (3, 3); [-].
         half_size: Half the edge lengths, shape (3,); [m].
+
+    Example:
+        >>> box = vp.Box("crate", np.zeros(3), np.eye(3), np.array([0.2, 0.1, 0.1]))
+        >>> float(box.corners[:, 0].max())
+        0.2
     """
 
     centre: FloatArray
@@ -233,6 +252,12 @@ class Prism(NamedSolid):
             axes and the sweep axis; [-].
         polygon: Corners in the section plane, shape (n, 2), either sense; [m].
         span: Where the sweep starts and ends along the sweep axis; [m].
+
+    Example:
+        >>> section = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, 0.1]])
+        >>> wedge = vp.Prism("wedge", np.zeros(3), np.eye(3), section, (0.0, 0.5))
+        >>> wedge.corners.shape
+        (6, 3)
     """
 
     origin: FloatArray
@@ -295,6 +320,11 @@ class HalfSpace(NamedSolid):
     Args:
         point: A point of the plane, shape (3,); [m].
         normal: Unit vector out of the solid, shape (3,); [-].
+
+    Example:
+        >>> floor = vp.HalfSpace("floor", np.zeros(3), np.array([0.0, 0.0, 1.0]))
+        >>> floor.name
+        'floor'
     """
 
     point: FloatArray

@@ -53,6 +53,12 @@ class Mesh(FromFile):
         triangles: Vertex indices, shape (m, 3), m >= 1.
         solid: Whether the problem says that there is an inside; None where it leaves
             that to the triangles.
+
+    Example:
+        >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+        >>> vp.Mesh("wedge", corners, faces).has_inside
+        True
     """
 
     vertices: FloatArray

@@ -68,6 +68,12 @@ class DesiredPath(ByValue):
 
     Raises:
         InvalidInput: If a value breaks its range, or directions do not fit the corners.
+
+    Example:
+        >>> corners = np.array([[3.1, 0.2, 0.0], [3.1, 0.2, 0.5]])
+        >>> path = vp.DesiredPath(np.array([3.126, 0.0, 0.0]), corners)
+        >>> float(path.length)
+        0.5
     """
 
     start: FloatArray

@@ -81,6 +81,12 @@ class PlanningProblem(AnyProblem, ByValue):
         InvalidInput: If the pose is no rigid motion, a required clearance is negative,
             a tolerance or limit not above 0, or one of them not finite, joint values do
             not fit the arm, or a start or goal stands beside a tip path.
+
+    Example:
+        >>> arm, tip = vp.built_in("hrm8"), np.array([3.126, 0.0, 0.0])
+        >>> path = vp.DesiredPath(tip, tip + [[0.0, 0.2, 0.0], [0.0, 0.2, 0.3]])
+        >>> vp.Problem(arm, vp.Scene(), path, 0.005, name="mine").name
+        'mine'
     """
 
     manipulator: Manipulator

@@ -129,6 +129,11 @@ class Scene:
 
     Raises:
         InvalidInput: If two share a name, or one is too far from the base.
+
+    Example:
+        >>> ball = vp.Sphere("ball", np.array([1.0, 0.5, 0.0]), 0.1)
+        >>> vp.Scene((ball,)).names
+        ('ball',)
     """
 
     obstacles: tuple[Obstacle, ...] = ()

@@ -53,6 +53,11 @@ class Trajectory(AnyMotion):
     Raises:
         InvalidInput: If shapes disagree, a value is not finite, times do not rise, a
             path_m goes beyond `TOLERANCES.path_extent`, or there is no row.
+
+    Example:
+        >>> motion = vp.plan(vp.read_problem("paper/free"), "paper").trajectory
+        >>> motion.alpha.shape == motion.theta.shape == (motion.n_samples, 8)
+        True
     """
 
     on_path: BoolArray

@@ -86,6 +86,14 @@ class Cell(AnyProblem):
     Raises:
         InvalidInput: If a clearance is negative or not finite, the pose is no rigid
             motion, or errors are of what there is not.
+
+    Example:
+        >>> ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+        >>> text = f'<robot name="one"><link name="ball">{ball}</link></robot>'
+        >>> _ = Path("one.urdf").write_text(text)
+        >>> cell = cell_of(vp.RobotFiles("one.urdf"))
+        >>> Cell(cell.robot, cell.scene, required_clearance=0.01).name
+        'one'
     """
 
     robot: Robot
@@ -203,6 +211,14 @@ def cell_of(
 
     Raises:
         InvalidInput: If a file is bad or a value makes no sense.
+
+    Example:
+        >>> ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+        >>> text = f'<robot name="one"><link name="ball">{ball}</link></robot>'
+        >>> _ = Path("one.urdf").write_text(text)
+        >>> post = vp.Sphere("post", np.array([1.0, 0.0, 0.0]), 0.2)
+        >>> cell_of(vp.RobotFiles("one.urdf"), vp.Scene((post,))).scene.names
+        ('post',)
     """
     if not isinstance(robot, RobotFiles):
         found = type(robot).__name__
@@ -233,6 +249,15 @@ def read_cell(path: str | Path) -> Cell:
 
     Raises:
         InvalidFile: If the file or one that it names breaks its contract.
+
+    Example:
+        >>> ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+        >>> text = f'<robot name="one"><link name="ball">{ball}</link></robot>'
+        >>> _ = Path("one.urdf").write_text(text)
+        >>> asked = "vdsm_problem: 1, length_unit: m, required_clearance: 0.01"
+        >>> _ = Path("one.yaml").write_text(f"{{{asked}, robot: {{urdf: one.urdf}}}}")
+        >>> read_cell("one.yaml").required_clearance
+        0.01
     """
     file = path_of(path)
     check_is_file(file)

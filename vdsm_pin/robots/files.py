@@ -46,6 +46,10 @@ class MeshCover:
 
     Raises:
         InvalidInput: If there is no such cover.
+
+    Example:
+        >>> vp.MeshCover("parts", 4).parts
+        4
     """
 
     cover: CoverKind = "hull"
@@ -118,6 +122,10 @@ class RobotFiles:
             at 0. None: all move that are not locked.
         solids: What stands for the meshes of links.
         joint_limits: A joint_limits.yaml of MoveIt; the stricter limit counts.
+
+    Example:
+        >>> vp.RobotFiles("robot.urdf", "robot.srdf", group="arm").group
+        'arm'
     """
 
     urdf: Path

@@ -24,6 +24,10 @@ class Verdict(StrEnum):
 
     Incomplete is a motion that draws less of the desired path than required and passes
     every other check.
+
+    Example:
+        >>> vp.Verdict.CERTIFIED.value
+        'certified'
     """
 
     CERTIFIED = "certified"
