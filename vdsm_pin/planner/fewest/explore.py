@@ -269,16 +269,16 @@ class _Exploration:
         worth = self.problem.required_clearance + self.margin
         worth += (level.slack + weights.clearance) * arm.total_length
         worth += 0.0 if margins is None else float(margins[-1])
-        return Judge(
+        judge = Judge(
             self.problem,
             self.clearance,
             self.margin,
             level.slack * arm.total_length,
             level.finest * arm.total_length,
             max(level.ease, least_ease),
-            rough=self.clearance.up_to(worth),
-            link_margins=margins,
+            margins,
         )
+        return judge.with_rough(self.clearance.up_to(worth))
 
     def _space(self, level: Insert) -> TipSpace:
         """Ways of the tip, kept for insertions that look as finely."""

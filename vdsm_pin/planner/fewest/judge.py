@@ -140,8 +140,6 @@ class Judge:
         finest: Way of the body below which an interval between two clear
             configurations counts as clear; [m].
         ease: Part of the largest link angle that may be used; [-].
-        rough: A cheaper clearance function, for single configurations; None for the
-            same one.
         link_margins: What each link keeps besides, shape (N,); None for nothing; [m].
     """
 
@@ -153,17 +151,22 @@ class Judge:
         slack: float,
         finest: float,
         ease: float = 1.0,
-        rough: LinkClearance | None = None,
         link_margins: FloatArray | None = None,
     ) -> None:
         self.problem, self.clearance = problem, clearance
         self.link_margins, self.cuts = link_margins, cuts_of(problem, clearance)
-        self.rough = clearance if rough is None else rough
+        self.rough = clearance
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
         self.limit = ease * link_limit(problem)
         self.own = OwnClearance(problem, slack, finest)
         self.cone = _cone(problem, slack)
+
+    def with_rough(self, rough: LinkClearance) -> "Judge":
+        """The same, which asks a cheaper function of single configurations."""
+        other = copy(self)
+        other.rough = rough
+        return other
 
     def until(self, deadline: Deadline) -> "Judge":
         """The same, which answers up to another time."""
