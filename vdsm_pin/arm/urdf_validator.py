@@ -138,8 +138,8 @@ def _tree_faults(robot: ET.Element) -> Iterator[str]:
             yield f"joint {name!r}: link {ends['child']!r} already has a parent"
         parent_of[ends["child"]] = ends["parent"]
     roots = sorted(links - parent_of.keys())
-    if len(roots) != 1:
-        yield f"expected one root link, found {len(roots)}: {', '.join(roots) or '-'}"
+    if len(roots) > 1:  # without any there is a loop
+        yield f"expected one root link, found {len(roots)}: {', '.join(roots)}"
     rooted = set[str]()
     for first in sorted(links):
         link, seen = first, set[str]()
