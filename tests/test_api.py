@@ -129,6 +129,30 @@ def test_a_problem_built_in_python_is_certified_once_it_is_a_file(
         vp.write_certificate(result, proof)
 
 
+def test_what_a_problem_is_made_of_shows_itself_in_words() -> None:
+    problem = in_python()
+    tool = replace(problem.manipulator, tool=vp.Tool(0.05, 0.01))
+    shown = {
+        tool: (
+            "links                3, 1000.0 mm together",
+            "mounted              tool",
+        ),
+        problem.scene: ("obstacles  1 Sphere", "names      ball"),
+        problem.tip_path: ("corners     2, open", "length      200.000 mm"),
+        vp.ErrorBox(base_mm=2.0, obstacles_mm={"ball": 1.0}): (
+            "base  2.000 mm",
+            "ball  1.000 mm",
+        ),
+        vp.ErrorBox(): ("errors  none",),
+    }
+    for one, lines in shown.items():
+        text = repr(one)
+        assert "array(" not in text
+        for line in lines:
+            assert line in text
+        assert f"<td>{text.split('  ')[-1]}</td></tr></table>" in one._repr_html_()
+
+
 def test_what_is_not_certified_leaves_no_file(tmp_path: Path) -> None:
     problem = vp.write_problem(in_python(), tmp_path / "p.yaml")
     motion = vp.plan(problem).trajectory

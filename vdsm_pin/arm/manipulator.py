@@ -13,7 +13,8 @@ from vdsm_pin.arm.mounted import MAX_LENGTH, BodySolid, Feed, LinkBody, Tool
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import ByValue, FloatArray, check_numbers, freeze, frozen
 from vdsm_pin.geometry.solids import Capsule
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.notebook import Summarised
+from vdsm_pin.units import MM_PER_M, quantity
 
 if TYPE_CHECKING:
     from vdsm_pin.arm.bodies import ArmBody, SelfPairs
@@ -32,8 +33,8 @@ PART: Final = " part "
 """Between the name of a body and the number of its convex part."""
 
 
-@dataclass(frozen=True, eq=False)
-class Manipulator(ByValue):
+@dataclass(frozen=True, eq=False, repr=False)
+class Manipulator(Summarised, ByValue):
     """Lengths, bodies and limits of one arm. A link is a capsule about its axis.
 
     Args:
@@ -325,6 +326,22 @@ class Manipulator(ByValue):
     def stations(self) -> FloatArray:
         """Arc length from O_1 to each joint centre, shape (N + 1,); [m]."""
         return frozen(np.concatenate([[0.0], np.cumsum(self.link_lengths)]))
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Sizes, limits and what is mounted."""
+        thin, thick = (quantity(r, "m") for r in (self.least_radius, self.most_radius))
+        names = [name for name in (TOOL, FEED) if getattr(self, name)]
+        mounted = *names, *(body.name for body in self.bodies)
+        low, high = (quantity(x, "m") for x in self.base_range)
+        return (
+            ("name", self.name),
+            ("links", f"{self.n_links}, {quantity(self.total_length, 'm')} together"),
+            ("radius", thick if thin == thick else f"{thin} to {thick}"),
+            ("largest link angle", quantity(self.max_link_angle, "rad")),
+            ("largest joint angle", quantity(self.max_joint_angle, "rad")),
+            ("rail", f"{low} to {high}"),
+            ("mounted", ", ".join(mounted) or "nothing"),
+        )
 
     @property
     def total_length(self) -> float:

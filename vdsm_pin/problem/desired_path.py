@@ -15,8 +15,10 @@ from vdsm_pin.geometry.arrays import (
     frozen,
     running_sums,
 )
+from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import point_mm, quantity
 
 
 class Approach(StrEnum):
@@ -44,8 +46,8 @@ class Order(StrEnum):
     FREE = "free"
 
 
-@dataclass(frozen=True, eq=False)
-class DesiredPath(ByValue):
+@dataclass(frozen=True, eq=False, repr=False)
+class DesiredPath(Summarised, ByValue):
     """What the tip shall draw, in the base frame.
 
     Args:
@@ -181,6 +183,19 @@ class DesiredPath(ByValue):
         """Arc length at each corner, shape (m,); [m]."""
         sides = np.linalg.norm(np.diff(self.corners, axis=0), axis=1)
         return frozen(np.concatenate([[0.0], running_sums(sides)]))
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Its start, corners and length, and where the last link looks."""
+        corners = f"{len(self.points)}, {'closed' if self.closed else 'open'}"
+        looks = "-" if self.pointing is None else quantity(self.pointing.cone, "rad")
+        return (
+            ("start", f"{point_mm(self.start)} mm"),
+            ("corners", corners),
+            ("length", quantity(self.length, "m")),
+            ("spacing", quantity(self.spacing, "m")),
+            ("order", self.order.value),
+            ("aim within", looks),
+        )
 
     @property
     def length(self) -> float:

@@ -11,7 +11,8 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, called, check_numbers, frozen, number
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.notebook import Summarised
+from vdsm_pin.units import MM_PER_M, quantity
 
 JointErrors = tuple[tuple[float, float], ...]
 
@@ -52,8 +53,8 @@ class JointError:
 _Named = TypeVar("_Named", ObstacleError, JointError)
 
 
-@dataclass(frozen=True, eq=False)
-class ErrorBox:
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorBox(Summarised):
     """How far the real motion may stray from the nominal one.
 
     Args:
@@ -113,6 +114,24 @@ class ErrorBox:
     @property
     def _values(self) -> tuple[object, ...]:
         return tuple(getattr(self, one.name) for one in fields(ErrorBox))
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """What may be off, and how far."""
+        plain = {
+            "every joint angle": (self.joint, "rad"),
+            "every slide": (self.slide, "m"),
+            "base": (self.base, "m"),
+            "turn of the base": (self.base_turn, "rad"),
+            "every obstacle": (self.obstacle, "m"),
+        }
+        rows = {name: quantity(*one) for name, one in plain.items() if one[0]}
+        for i, (alpha, theta) in enumerate(self.joints, 1):
+            rows[f"joint {i}"] = quantity(max(alpha, theta), "rad")
+        single: list[ObstacleError | JointError] = [*self.obstacles, *self.named]
+        for one in single:
+            both = [(one.shift, "m"), (one.turn, "rad")]
+            rows[one.name] = " and ".join(quantity(*o) for o in both if o[0])
+        return tuple(rows.items()) or (("errors", "none"),)
 
     def with_joint(self, joint: float) -> "ErrorBox":
         """A copy with one error of all joint angles; [rad]."""

@@ -1,9 +1,10 @@
 """Obstacles, at rest and moving, in the base frame."""
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, cast
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.convex import Piece
 from vdsm_pin.geometry.primitives import NamedSolid
 from vdsm_pin.geometry.solids import ConvexCover, Mesh, Solid
+from vdsm_pin.notebook import Summarised
 from vdsm_pin.proof.tree import Kind, Tree
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -20,6 +22,10 @@ if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
     from vdsm_pin.geometry.pieces import PackedPieces
     from vdsm_pin.problem.trajectory import Trajectory
     from vdsm_pin.proof.paths import Path
+
+
+SHOWN: Final = 8
+"""Names of obstacles that a console shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +126,8 @@ def reach_of(obstacle: Obstacle | ConvexCover) -> float:
     return obstacle.reach
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, repr=False)
+class Scene(Summarised):
     """All obstacles of one problem, in the base frame.
 
     Args:
@@ -164,6 +170,17 @@ class Scene:
                 message = f"two obstacles are named {name!r}; names are unique"
                 raise InvalidInput(message)
             seen.add(name)
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """How many obstacles there are, what they are, and which."""
+        kinds = Counter(type(solid_of(one)).__name__ for one in self.obstacles)
+        counted = (f"{count} {kind}" for kind, count in kinds.items())
+        more = ", ..." if len(self.names) > SHOWN else ""
+        return (
+            ("obstacles", ", ".join(counted) or "none"),
+            ("names", ", ".join(self.names[:SHOWN]) + more or "-"),
+            ("that move", str(len(self.moving))),
+        )
 
     @cached_property
     def names(self) -> tuple[str, ...]:
