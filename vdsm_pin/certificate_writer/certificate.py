@@ -34,6 +34,7 @@ from vdsm_pin.certificate_writer.schema import (
 )
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.parts import PartPlan
+from vdsm_pin.proof.recording import by_all_corners
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.inside import (
@@ -168,7 +169,7 @@ def _proved(
             **dict(link_pieces(links, own, pieces)),
             **links_of_others(obstacles, pieces),
         },
-    }, Recorded(proving.task, proving.motion, whole)
+    }, Recorded(by_all_corners(proving.task), proving.motion, whole)
 
 
 def _pairs(plan: PartPlan, n_bodies: int) -> list[Pair]:

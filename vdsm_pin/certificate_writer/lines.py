@@ -38,7 +38,7 @@ from vdsm_pin.proof.layouts import (
     SLICE_START,
 )
 from vdsm_pin.proof.motions import Motion
-from vdsm_pin.proof.recording import by_all_corners, record
+from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import new_workspace
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -95,7 +95,7 @@ class Recorded:
     """The proof that is written down.
 
     Args:
-        task: What was proved.
+        task: What was proved, by all corners of each body.
         motion: Of what.
         whole: Pieces of each partner that one plane serves, 0 for no such rule.
     """
@@ -174,7 +174,7 @@ def _packed(path: Path) -> Iterator[IO[bytes]]:
 def _lines(proof: Recorded, deadline: Deadline) -> Iterator[str]:
     """One line per interval, in parts."""
     step("writing the certificate")
-    motion, task = proof.motion, by_all_corners(proof.task)
+    motion, task = proof.motion, proof.task
     n_intervals = max(1, len(motion.knots) - 1)
     work = new_workspace(task, motion.knots.shape[1], Budget().slices)
     records, first = np.zeros((ROOM, RECORD)), 0
