@@ -280,8 +280,9 @@ def write_problem(problem: PlanningProblem, path: str | Path) -> PlanningProblem
         path: The file; it appears whole or not at all.
 
     Returns:
-        The problem as it is read from that file. Certificates are bound to it: plan and
-        verify this one. Degrees and frames may change the last digit of a value.
+        The problem as it is read from that file, which is the one to plan and verify
+        since certificates are bound to it. Degrees and frames may change the last digit
+        of a value.
 
     Raises:
         InvalidInput: If it has what no problem file says, as obstacles that are carried
