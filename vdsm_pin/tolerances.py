@@ -88,7 +88,7 @@ class Tolerances:
     least_bracket: float = _held(1e-6, "m")
     """Width to which the bracket of the least clearance is narrowed; [m]."""
 
-    far_bracket: float = _held(0.5, "-")
+    far_bracket: float = _held(0.75, "-")
     """Part of the clearance that a bracket of a pair far beyond what is required may be
     wide, in judging robots: no verdict hangs on it, and a new plane costs more; [-]."""
 

@@ -17,7 +17,7 @@ from vdsm_pin.geometry.bernstein import derivative
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.extremes import largest, range_check
+from vdsm_pin.verification.extremes import largest, range_checks
 from vdsm_pin.verification.pinocchio_frames import PinocchioFrames, read_model
 from vdsm_pin.verification.records import Check, Verdict
 
@@ -158,13 +158,13 @@ def checks_by_itself(robot: Robot, path: Path) -> list[Check]:
 
     Limits have slack for the arithmetic of readers.
     """
-    slack, held = TOLERANCES.arithmetic, []
-    for k, joint in enumerate(robot.joints):
-        ends = joint.lower, joint.upper
-        if np.isfinite(ends).all():
-            name, n = LIMITS.format(name=joint.name), len(path.knots)
-            row = Check(name, Verdict.UNDECIDED, n, nan, nan, joint.unit, joint.whose)
-            held.append(range_check(path, k, ends, slack, row))
+    n, ends = len(path.knots), np.array([(j.lower, j.upper) for j in robot.joints])
+    ends = ends.reshape(-1, 2)
+    limited, rows = np.flatnonzero(np.isfinite(ends).all(axis=1)), []
+    for joint in [robot.joints[k] for k in limited.tolist()]:
+        name, unit, whose = LIMITS.format(name=joint.name), joint.unit, joint.whose
+        rows.append(Check(name, Verdict.UNDECIDED, n, nan, nan, unit, whose))
+    held = range_checks(path, limited, ends[limited], TOLERANCES.arithmetic, rows)
     return [pose_check(robot, path), *held, *rate_checks(robot.joints, path)]
 
 

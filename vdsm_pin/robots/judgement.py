@@ -23,10 +23,10 @@ from vdsm_pin.verification.limits import checks_of_others
 from vdsm_pin.verification.records import Check, CheckKind, Verdict, Verification
 
 NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
-WIDTH: Final = 0.2
+WIDTH: Final = 0.4
 """Brackets wider than this part of the clearance are asked of a new plane; [-]."""
 
-NEAR: Final = 0.05
+NEAR: Final = 0.02
 """Coal measures pairs that may come nearer than this beyond what is required; of others
 wider brackets do; [m]."""
 

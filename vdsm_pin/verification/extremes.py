@@ -150,29 +150,55 @@ def _with_pieces(
     return found.bounded(most)
 
 
-def range_check(
-    path: Path, column: int, ends: tuple[float, float], slack: float, row: Check
-) -> Check:
-    """Whether a column keeps within its range: what comes nearest to an end of it.
+def range_checks(
+    path: Path,
+    columns: IntArray,
+    ends: FloatArray,
+    slack: float,
+    rows: Sequence[Check],
+) -> list[Check]:
+    """Whether columns keep within their ranges: what comes nearest to an end of each.
 
     Args:
         path: The motion.
-        column: Which one.
-        ends: Of the range; [m] or [rad].
+        columns: Which ones, shape (n,).
+        ends: Of their ranges, shape (n, 2); [m] or [rad].
         slack: How far beyond its ends is allowed; [m] or [rad].
-        row: What is said besides.
+        rows: What is said besides, one each.
     """
+    if path.degree > 1:
+        each = zip(columns.tolist(), ends, strict=True)
+        found = [largest(pieces_of(path), _beyond(*one), slack) for one in each]
+    else:
+        found = _of_rows(path.knots[:, columns], ends)
+    checks = []
+    for row, one, (low, high) in zip(rows, found, ends.tolist(), strict=True):
+        worst, limit = one.worst(slack), low if one.column else high
+        value = low - worst if one.column else high + worst
+        verdict, moment = one.verdict(slack), one.moment
+        checks.append(
+            replace(row, verdict=verdict, worst=value, limit=limit, moment=moment)
+        )
+    return checks
+
+
+def _beyond(column: int, ends: FloatArray) -> Measure:
+    """How far a column is beyond the upper and the lower end of its range."""
     low, high = ends
 
     def beyond(q: FloatArray) -> FloatArray:
         return np.stack([q[:, column] - high, low - q[:, column]], axis=1)
 
-    found = largest(pieces_of(path), beyond, slack)
-    worst = found.worst(slack)
-    return replace(
-        row,
-        verdict=found.verdict(slack),
-        worst=low - worst if found.column else high + worst,
-        limit=low if found.column else high,
-        moment=found.moment,
-    )
+    return beyond
+
+
+def _of_rows(values: FloatArray, ends: FloatArray) -> list[Largest]:
+    """How far each column is beyond an end of its range at most, of straight lines."""
+    above, below = values.argmax(axis=0), values.argmin(axis=0)
+    number = np.arange(values.shape[1])
+    over, under = values[above, number] - ends[:, 1], ends[:, 0] - values[below, number]
+    found = []
+    for k, is_low in enumerate((under > over).tolist()):
+        seen, row = (under[k], below[k]) if is_low else (over[k], above[k])
+        found.append(Largest(float(seen), float(row), int(is_low), float(seen)))
+    return found

@@ -26,7 +26,7 @@ from vdsm_pin.verification.extremes import (
     cut,
     largest,
     pieces_of,
-    range_check,
+    range_checks,
 )
 from vdsm_pin.verification.records import Check, Verdict
 
@@ -108,8 +108,8 @@ def arm_limits(arm: Manipulator, trajectory: Trajectory) -> list[Check]:
         where = f"{symbol}{found.column + 1}"
         checks.append(_angle_check(name, where, limit, count, found))
     row = Check(RAIL, Verdict.UNDECIDED, trajectory.n_samples, nan, nan, "m")
-    slack = TOLERANCES.base_limit
-    return [*checks, range_check(path, 0, arm.base_range, slack, row)]
+    ends, slack = np.array([arm.base_range]), TOLERANCES.base_limit
+    return [*checks, *range_checks(path, np.zeros(1, int), ends, slack, [row])]
 
 
 def checks_of_others(scene: Scene) -> Iterator[Check]:

@@ -20,7 +20,7 @@ from vdsm_pin.proof.paths import Path, together
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.proof.tree import Tree
 
-PART: Final = 0.4
+PART: Final = 0.3
 """About how far a column of q moves in one part of a long interval; [rad], [m]."""
 
 MOST_PARTS: Final = 64
