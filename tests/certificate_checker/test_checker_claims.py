@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import arb
 from oracles.certificate_cases import SHAPES, random_case
 from oracles.certificate_oracle import sealed
+from oracles.tree_certificates import controls
 
 from vdsm_pin.certificate_checker import check_certificate, claims
 from vdsm_pin.certificate_checker.arm import Arm
@@ -33,7 +33,7 @@ def test_a_plane_proves_what_the_formula_of_the_docs_says() -> None:
             Joint(1, TURNS, (0, 0, 1), np.eye(4), (1, 1.0, 0.0), (turn, 0.0, bent)),
         ]
         tree = Tree(joints)
-        interval = Interval(tree, [[arb(0), arb(0.1)], [arb(0), arb(shift)]])
+        interval = Interval(tree, controls([0, 0.1], [0, shift]))
         slices = Slices(tree, [(interval, 0.0, 1.0)])
         radius, grown = rng.uniform(0.01, 0.1, 2)
         body = Body(2, Solid("ball", [[[0.5, 0.0, 0.0]]], radius=radius))
@@ -61,7 +61,7 @@ def slices_of(interval: Interval) -> tuple[Interval, float, float]:
 @pytest.mark.parametrize("length", [0.0, 1e-101, 1e101, np.inf, np.nan])
 def test_a_direction_that_is_none_is_refused(length: float) -> None:
     tree = Tree([Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 1.0, 0.0), (0.0, 0.0, 0.0))])
-    interval = Interval(tree, [[arb(0), arb(0)]])
+    interval = Interval(tree, controls([0, 0]))
     pair = Pair(
         Body(1, Solid("a", [[[0.0, 0.0, 0.0]]])),
         Solid("b", [[[0, 1.0, 0]]]),
@@ -81,7 +81,7 @@ def test_a_direction_that_is_none_is_refused(length: float) -> None:
 def test_a_half_space_has_one_direction(axis: int, off: float, good: bool) -> None:
     """It may be off by 1e-9 a coordinate; what is proved is of the exact one."""
     tree = Tree([Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 1.0, 0.0))])
-    interval = Interval(tree, [[arb(0), arb(0)]])
+    interval = Interval(tree, controls([0, 0]))
     floor = Solid("floor", [[[0.0, 0.0, -2.0]]])
     floor.normal = np.array([0.48, 0.6, 0.64])
     pair = Pair(Body(1, Solid("a", [[[9.0, 0.0, 0.0]]])), floor, 0, 0.0, 0.0)
@@ -231,7 +231,7 @@ def test_pairs_of_planes_for_single_pieces_are_told() -> None:
     clearances = Clearances(Tree([joint]), path, pairs)
     first_pose, by_pieces = clearances.check(iter([{"k": 0, "proofs": proofs}]))
     assert by_pieces == {*pairs[1:]}
-    assert first_pose[1][0].entries() == [0, 0, 0]
+    assert first_pose[1].entries()[3::4] == [0, 0, 0, 1]
 
 
 def test_lines_end_with_the_last_interval_and_not_before() -> None:

@@ -14,6 +14,7 @@ import pytest
 from flint import arb, arb_mat, ctx
 from oracles.certificate_cases import Case
 from oracles.certificate_oracle import frames_and_centres, sealed
+from oracles.tree_certificates import controls
 
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate
@@ -273,7 +274,7 @@ def test_limits_of_smooth_motions_are_those_of_the_curve(degree: int) -> None:
         for more in (1.0 - 1e-6, 1.0 + 1e-6):
             columns = [[arb(0)] * (degree + 1) for _ in range(17)]
             columns[5:7] = [[arb(more * low * x) for x in row] for row in pair.tolist()]
-            motion = SimpleNamespace(controls=columns, degree=degree)
+            motion = SimpleNamespace(controls=controls(*columns), degree=degree)
             with ctx.workprec(PRECISION), suppress(Rejected):
                 kept = False
                 rows._limits(motion)
@@ -336,7 +337,7 @@ def test_obstacles_on_a_carrier_follow_its_own_frames() -> None:
     tree, path, frames = beside(own, [rail], obstacles)
     assert frames == [0, 2, 3]
     pose = Interval(tree, path.controls(0)).pose(0.5)
-    places = [[*map(float, pose[k][0].entries())] for k in (1, *frames[1:])]
+    places = [[*map(float, pose[k].entries()[3:12:4])] for k in (1, *frames[1:])]
     assert places == [[0.0, 0.0, 7.5], [1.5, 0.0, 0.0], [1.5, 2.5, 0.0]]
 
 
@@ -362,21 +363,21 @@ def test_a_branch_rests_before_its_first_knot_and_after_its_last() -> None:
     """At that knot; in between it is on the straight line."""
     branch = Branch(np.array([[2.0, -1.0], [5.0, 0.0], [4.0, 3.0]]), np.arange(1.0, 4))
     for start, end, ends in (
-        (0.0, 1.0, [[2.0, 2.0], [-1.0, -1.0]]),
-        (1.0, 2.0, [[2.0, 5.0], [-1.0, 0.0]]),
-        (2.25, 2.5, [[4.75, 4.5], [0.75, 1.5]]),
-        (3.0, 4.0, [[4.0, 4.0], [3.0, 3.0]]),
-        (7.0, 9.0, [[4.0, 4.0], [3.0, 3.0]]),
+        (0.0, 1.0, [[2.0, -1.0], [2.0, -1.0]]),
+        (1.0, 2.0, [[2.0, -1.0], [5.0, 0.0]]),
+        (2.25, 2.5, [[4.75, 0.75], [4.5, 1.5]]),
+        (3.0, 4.0, [[4.0, 3.0], [4.0, 3.0]]),
+        (7.0, 9.0, [[4.0, 3.0], [4.0, 3.0]]),
     ):
         found = branch.between(start, end)
-        assert [[float(q) for q in points] for points in found] == ends
+        assert [[*map(float, row.entries())] for row in found] == ends
 
 
 @pytest.mark.parametrize("parts", [1, 4])
 def test_a_rail_that_gains_speed_takes_the_tip_off_its_chord(parts: int) -> None:
     """By (x'' h^2 / 8) of x0 = t^3 over each of the slices of width h."""
     joint = Joint(0, SLIDES, (1, 0, 0), np.eye(4), (0, 1.0, 0.0))
-    motion = Interval(Tree([joint]), [[arb(0), arb(0), arb(0), arb(1)]])
+    motion = Interval(Tree([joint]), controls([0, 0, 0, 1]))
     bends: list[float] = []
     drawing: Any = SimpleNamespace(
         point=lambda station: arb_mat([[station], [0], [0]]),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb
+from oracles.tree_certificates import controls
 
 from vdsm_pin.certificate_checker.balls import Ball, column, cross, dot, norm
 from vdsm_pin.certificate_checker.motion import Branch, Interval, Slices
@@ -35,7 +36,7 @@ def reached(
     place[2, 3] = HIGH
     joint = Joint(0, TURNS, (0, 0, 1), place, (0, 1.0, 0.0), errors)
     tree = Tree([joint])
-    interval = Interval(tree, [[arb(0), arb(width / share)]])
+    interval = Interval(tree, controls([0, width / share]))
     slices = Slices(tree, [(interval, 0.0, share)])
     ends = [[[LEVER, 0.0, 0.0], [LEVER / 2.0, 0.0, 0.0]]]
     point = Solid("point", ends, disc=((1.0, 0.0, 0.0), disc))
@@ -87,10 +88,10 @@ def test_pieces_are_of_the_degree_of_what_is_given(inner: int, n_rates: int) -> 
 def test_rates_of_a_part_are_those_within_it(part: tuple[float, float]) -> None:
     """Of q = 3 t^2, whose joint turns by 2 q: value, rate and its change at the end."""
     tree = Tree([Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 2.0, 0.0))])
-    interval = Interval(tree, [[arb(0), arb(0), arb(3)]])
+    interval = Interval(tree, controls([0, 0, 3]))
     end = part[1]
-    (found,) = interval.rates(*part)
-    assert found == pytest.approx([6.0 * end**2, 12.0 * end, 12.0], rel=1e-11)
+    (found,) = Slices(tree, [(interval, *part)]).bounds
+    assert found[:, 0] == pytest.approx([6.0 * end**2, 12.0 * end, 12.0], rel=1e-11)
 
 
 def exact(point: Any) -> Ball:
@@ -113,11 +114,12 @@ def test_bounds_lie_above_what_rounding_loses_of_them() -> None:
         least = arb(moved) + (arb(value) if kind == SLIDES else 0)
         assert arb(made.slip) > least
         points = [arb(x) for x in rng.normal(size=4)]
-        (found,) = Interval(Tree([made]), [points]).rates(0.0, 1.0)
+        interval = Interval(tree := Tree([made]), controls(points))
+        (found,) = Slices(tree, [(interval, 0.0, 1.0)]).bounds
         steps = [b - a for a, b in pairwise(points)]
         twice = [6 * (b - a) for a, b in pairwise(steps)]
         for bound, values in zip(
-            found, (points, [3 * x for x in steps], twice), strict=True
+            found[:, 0].tolist(), (points, [3 * x for x in steps], twice), strict=True
         ):
             more = arb(offset) if values is points else arb(0)
             assert all(arb(bound) > abs(2 * x) + more for x in values)

@@ -473,11 +473,8 @@ def assert_read_alike(files: RobotFiles, rng: Rng) -> None:
     placed = robot.poses(rows)
     for name, frame in robot.frames.items():
         for pose, frames in zip(placed[:, frame], mine, strict=True):
-            origin, turned = frames[joints.frames[name]]
-            found = np.array([[*map(float, row)] for row in turned.tolist()])
-            place = [*map(float, origin.entries())]
-            np.testing.assert_allclose(pose[:3, :3], found, rtol=0, atol=1e-13)
-            np.testing.assert_allclose(pose[:3, 3], place, rtol=0, atol=1e-13)
+            found = np.array(frames[joints.frames[name]].tolist(), float)
+            np.testing.assert_allclose(pose, found, rtol=0, atol=1e-13)
 
 
 def judged_at_random(folder: Path, seed: int) -> bool:

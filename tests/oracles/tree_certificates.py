@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from flint import arb, arb_mat
 from oracles.shortcuts import start_proof
 from oracles.tree_queries import TreeQuery
 
@@ -17,6 +18,12 @@ from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.recording import record
 
 ROOM = 20_000
+
+
+def controls(*columns: Any) -> list[Any]:
+    """Control points of q, of those of each of its columns."""
+    rows = zip(*columns, strict=True)
+    return [arb_mat([[arb(value) for value in row]]) for row in rows]
 
 
 def solid_of(name: str, piece: Any) -> Solid:

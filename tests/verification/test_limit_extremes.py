@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import arb
+from flint import arb_mat
 
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.arm.manipulator import built_in
@@ -194,7 +194,7 @@ def test_the_checker_accepts_what_is_certified_on_a_limit(seed: int) -> None:
         motion = Trajectory.of_joints(rows)
         found = [row.verdict for row in check_limits(PROBLEM, motion)]
         if all(verdict is Verdict.CERTIFIED for verdict in found):
-            columns = [[arb(float(q)) for q in column] for column in rows.T]
-            interval: Any = SimpleNamespace(controls=columns, degree=1)
+            points = [arb_mat([row]) for row in rows.tolist()]
+            interval: Any = SimpleNamespace(controls=points, degree=1)
             asked: Any = SimpleNamespace(problem=PROBLEM, lengths=[1.0])
             Rows(asked, motion)._limits(interval)

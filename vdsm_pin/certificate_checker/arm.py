@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.certificate_checker import solids
-from vdsm_pin.certificate_checker.balls import belongs, claim, column
+from vdsm_pin.certificate_checker.balls import belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import Branch, Path, beside
 from vdsm_pin.certificate_checker.rows import Rows
@@ -154,7 +154,7 @@ class Arm:
             held = [pair for pair in self.pairs if pair.solid is mesh]
             pairs, points = [pair for pair in held if pair in by_pieces], []
             if {*own} <= {p.body for p in held} and any(p.body.own for p in pairs):
-                points = [(first[1], column(0, 0, 0), thinnest)]
+                points = [(first[1], (0, 0, 0), thinnest)]
                 pairs = [pair for pair in pairs if not pair.body.own]
             points += [pair.inner(first) for pair in pairs]
             mesh.check_outside(first[self.frames[self.solids.index(mesh)]], points)

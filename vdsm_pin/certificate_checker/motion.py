@@ -8,19 +8,29 @@ before, heights come with what they may be off.
 from collections.abc import Sequence
 from functools import cached_property, reduce
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import UP, Ball, claim
+from vdsm_pin.certificate_checker.balls import UP, Ball, Matrix, claim
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Pose, Tree, hung
 from vdsm_pin.problem.scene import Moving
 
-Points: TypeAlias = Sequence[Ball]  # the control points of a column of q
+Points: TypeAlias = Sequence[Any]  # control points: rows of q, or of one column
 
 
-def blossom(points: Points, shares: Sequence[Ball]) -> Ball:
+def row(values: Any) -> Matrix:
+    """A row of doubles in balls."""
+    return arb_mat([values.tolist()])
+
+
+def columns_of(points: Points) -> list[Points]:
+    """The control points of every column of q."""
+    return [*zip(*(point.entries() for point in points), strict=True)]
+
+
+def blossom(points: Points, shares: Sequence[Ball]) -> Any:
     """De Casteljau's value of control points, each step at a share of its own."""
     for share in shares:
         points = [a + (b - a) * share for a, b in pairwise(points)]
@@ -56,8 +66,9 @@ def raised(points: Points, degree: int) -> Points:
 
 
 def derivative(points: Points) -> Points:
-    """Control points of how fast a column changes."""
-    return [(b - a) * (len(points) - 1) for a, b in pairwise(points)]
+    """Control points of how fast columns change."""
+    degree = len(points) - 1
+    return [(b - a) * degree for a, b in pairwise(points)] or [points[0] * 0]
 
 
 class Branch:
@@ -81,37 +92,31 @@ class Branch:
         if rates and len(knots) > 1:
             self.degree = 1 + 2 * len(rates)
 
-    def controls(self, k: int) -> list[Points]:
-        """Control points of every column over interval k; a single row stands still."""
-
-        def ends(values: Any) -> Any:
-            last = min(k + 1, len(values) - 1)
-            return (arb_mat([values[row].tolist()]) for row in (k, last))
-
-        rows = [*ends(self.knots)]
+    def controls(self, k: int) -> Points:
+        """Control points over interval k; a single row stands still."""
+        ends = k, min(k + 1, len(self.knots) - 1)
+        first, last = (row(self.knots[i]) for i in ends)
         if self.inner is not None:
-            rows[1:1] = [arb_mat([row]) for row in self.inner[k].tolist()]
-        elif self.degree > 1:
-            step = arb(self.times[k + 1]) - arb(self.times[k])
-            first, last = rows
-            v, w = (rate * (step / self.degree) for rate in ends(self.rates[0]))
-            rows[1:1] = [first + v, last - w]
-            if self.degree == 5:
-                a, b = (c * (step * step / 20) for c in ends(self.rates[1]))
-                rows[2:2] = [first + 2 * v + a, last - 2 * w + b]
-        return [*map(list, zip(*(row.entries() for row in rows), strict=True))]
+            return [first, *map(row, self.inner[k]), last]
+        if self.degree == 1:
+            return [first, last]
+        step = arb(self.times[k + 1]) - arb(self.times[k])
+        v, w = (row(self.rates[0][i]) * (step / self.degree) for i in ends)
+        if self.degree == 3:
+            return [first, first + v, last - w, last]
+        a, b = (row(self.rates[1][i]) * (step * step / 20) for i in ends)
+        middle = [first + v, first + 2 * v + a, last - 2 * w + b, last - w]
+        return [first, *middle, last]
 
-    def between(self, start: float, end: float) -> list[Points]:
+    def between(self, start: float, end: float) -> Points:
         """Control points between two times; it rests before its first and last."""
         k, last = int(np.searchsorted(self.times, start, "right")) - 1, len(self.knots)
         if not 0 <= k < last - 1:
-            row = self.knots[min(max(k, 0), last - 1)]
-            return [[arb(q)] * 2 for q in row.tolist()]
+            return [row(self.knots[min(max(k, 0), last - 1)])] * 2
         if (start, end) == (self.times[k], self.times[k + 1]):
             return self.controls(k)
         own, step = arb(self.times[k]), arb(self.times[k + 1]) - arb(self.times[k])
-        low, high = (start - own) / step, (end - own) / step
-        return [part(points, low, high) for points in self.controls(k)]
+        return part(self.controls(k), (start - own) / step, (end - own) / step)
 
 
 class Path:
@@ -128,11 +133,12 @@ class Path:
         self.times = times[(times >= first) & (times <= last)]
         self.size = max(1, len(self.times) - 1)
 
-    def controls(self, k: int) -> list[Points]:
-        """Control points of every column of q over interval k."""
+    def controls(self, k: int) -> Points:
+        """Control points of all of q over interval k."""
         ends = self.times[k], self.times[min(k + 1, len(self.times) - 1)]
-        found = [points for one in self.branches for points in one.between(*ends)]
-        return [raised(points, self.degree) for points in found]
+        every = [raised(one.between(*ends), self.degree) for one in self.branches]
+        rows = zip(*every, strict=True)
+        return [arb_mat([[q for one in row for q in one.entries()]]) for row in rows]
 
 
 def beside(own: Branch, joints: Sequence[Joint], obstacles: Sequence[Any]) -> Any:
@@ -158,73 +164,19 @@ def beside(own: Branch, joints: Sequence[Joint], obstacles: Sequence[Any]) -> An
     return Tree(joints), Path(*branches), at
 
 
-class Sweep(NamedTuple):
-    """Bounds of how a point moves as seen from a frame, and of what errors add.
+def terms(segment: Sequence[Any], turning: Any) -> Any:
+    """What a segment adds to the bounds of a point, shape (6, ..).
 
-    Numbers, or arrays of one for each slice.
+    To its speed, M, S, D, how far errors carry it in the first order, and Q.
 
     Args:
-        turn: W, how fast the point's frame turns.
-        swing: A, how fast that changes.
-        erring: E, the sum of the errors of angles.
-        turned: C, that and the turns of placements.
-        speed: Of the point.
-        bend: M, of its acceleration.
-        tilting: What turns of placements add to that.
-        drift: D, how fast the first order of errors of angles changes.
-        first: How far errors carry it in the first order.
-        second: Q, and beyond it.
+        segment: Its length at most, how fast that changes, how fast the rate does.
+        turning: Of its frame W, A, E and C, arrays.
     """
-
-    turn: Any = 0.0
-    swing: Any = 0.0
-    erring: Any = 0.0
-    turned: Any = 0.0
-    speed: Any = 0.0
-    bend: Any = 0.0
-    tilting: Any = 0.0
-    drift: Any = 0.0
-    first: Any = 0.0
-    second: Any = 0.0
-
-    def at(self, far: Any, rate: Any = 0.0, change: Any = 0.0) -> "Sweep":
-        """Of a point so far from it in its frame, or as far at most as it slides.
-
-        Args:
-            far: A distance, or an array of some.
-            rate: How fast that changes at most.
-            change: How fast the rate does.
-        """
-        w, a, e, c, speed, bend, tilting, drift, first, second = self
-        bent = far * (w * w + a) + 2.0 * w * rate + change
-        return Sweep(
-            *(w, a, e, c),
-            speed=speed + far * w + rate,
-            bend=bend + bent,
-            tilting=tilting + bent * (c - e),
-            drift=drift + far * e * w + e * rate,
-            first=first + far * c,
-            second=second + far * c * c / 2.0,
-        )
-
-    def past(self, joint: Joint, up: bool, value: Sequence[Any]) -> "Sweep":
-        """Of the frame behind one more joint, passed upwards or not.
-
-        Args:
-            joint: The joint.
-            up: Whether the frame is the one that it hangs on.
-            value: Bounds of its value, of its rate and of how fast that changes.
-        """
-        now = self if up or joint.lever == 0.0 else self.at(joint.lever)
-        rate, change = value[1:] if joint.kind == TURNS else (0.0, 0.0)
-        now = now._replace(
-            turn=now.turn + rate,
-            swing=now.swing + change,
-            erring=now.erring + joint.turn_error,
-            turned=now.turned + joint.turn_error + joint.tilt,
-        )
-        now = now.at(joint.lever) if up and joint.lever > 0.0 else now
-        return now.at(*value) if joint.kind == SLIDES else now
+    (far, rate, change), (w, a, e, c) = segment, turning
+    speed, bend = far * w + rate, far * (w * w + a) + 2.0 * w * rate + change
+    first = far * c
+    return np.array([speed, bend, bend * (c - e), e * speed, first, first * c / 2.0])
 
 
 class Interval:
@@ -232,47 +184,39 @@ class Interval:
 
     Args:
         tree: The joints, with their errors.
-        controls: Control points of every column of q.
+        controls: Control points of q.
         before: How it begins, where that is known.
     """
 
     def __init__(
-        self, tree: Tree, controls: Sequence[Points], before: Pose | None = None
+        self, tree: Tree, controls: Points, before: Pose | None = None
     ) -> None:
         self.tree, self.controls = tree, controls
-        self.degree = max(map(len, controls), default=2) - 1
+        self.degree = len(controls) - 1
         self.poses = {} if before is None else {0.0: before}
 
     def pose(self, time: float) -> Pose:
         """All frames at a time in [0, 1]."""
         if time not in self.poses:
             shares = [arb(time)] * self.degree
-            q = [blossom(points, shares) for points in self.controls]
-            self.poses[time] = self.tree.pose(q)
+            q = blossom(self.controls, shares)
+            self.poses[time] = self.tree.pose(q.entries())
         return self.poses[time]
 
     def frames(self, time: float) -> list[list[float]]:
-        """Of all frames origin and rotation, in doubles, shape (n_frames, 12)."""
-        pose = self.pose(time)
-        return [[*map(float, o.entries() + turn.entries())] for o, turn in pose]
+        """The first three rows of all frames, in doubles, shape (n_frames, 12)."""
+        return [[*map(float, frame.entries()[:12])] for frame in self.pose(time)]
 
-    def rates(self, low: float, high: float) -> list[list[float]]:
-        """Of a slice bounds of joints' values, rates and how fast those change."""
-        bounds = []
-        for points in self.controls:
-            sizes, cut = [0.0] * 3, (low, high) != (0.0, 1.0)
-            values = points
-            for order in range(min(3, len(points))):
-                values = derivative(values) if order else points
-                here = part(values, arb(low), arb(high)) if cut else values
-                sizes[order] = UP * float(reduce(arb.max, map(abs, here)))
-            bounds.append(sizes)
-        found = []
-        for joint in self.tree.joints:
-            sizes = [0.0] * 3 if joint.column is None else bounds[joint.column]
-            far, rate, change = (joint.gain * size for size in sizes)
-            found.append([far + joint.past, rate, change])
-        return found
+    def bounds(self, low: float, high: float) -> list[list[float]]:
+        """Of a slice bounds of q, of its rates and of how fast those change."""
+        points, bounds = self.controls, []
+        for _ in range(3):
+            cut = (low, high) != (0.0, 1.0)
+            here = part(points, arb(low), arb(high)) if cut else points
+            columns = (map(abs, column) for column in columns_of(here))
+            bounds.append([UP * float(reduce(arb.max, column)) for column in columns])
+            points = derivative(points)
+        return bounds
 
 
 class Slices:
@@ -289,29 +233,54 @@ class Slices:
         self.tree, self.slices = tree, slices
         self.numbers = {one: i for i, one in enumerate(slices)}
         self.widths = np.array([b - a for _, a, b in slices])
-        rates = np.array([one.rates(*times) for one, *times in slices])
-        self.rates = rates.reshape(-1, len(tree.joints), 3).transpose(1, 2, 0)
-        self.sweeps = dict[tuple[int, int], Sweep]()
+        self.sweeps = dict[tuple[int, int], tuple[Any, Any]]()
 
     @cached_property
     def frames(self) -> tuple[Any, Any]:
         """Origins and rotations of all frames at both ends, in doubles."""
         ends = [[one.frames(t) for t in times] for one, *times in self.slices]
-        shape = len(ends), 2, len(self.tree.joints) + 1
-        flat = np.array(ends).reshape(*shape, 12)
-        return flat[..., :3], flat[..., 3:].reshape(*shape, 3, 3)
+        frames = np.array(ends).reshape(*np.shape(ends)[:3], 3, 4)
+        return frames[..., 3], frames[..., :3]
 
-    def sweep(self, rest: int, frame: int) -> Sweep:
-        """How the origin of a frame moves as seen from another one."""
+    @cached_property
+    def bounds(self) -> list[Any]:
+        """Of each joint bounds of its value, rate and change, shape (3, n_slices)."""
+        columns = np.array([one.bounds(*times) for one, *times in self.slices]).T
+        return [joint.bounds(columns) for joint in self.tree.joints]
+
+    def sweep(self, rest: int, frame: int) -> tuple[Any, Any]:
+        """W, A, E and C of a frame seen from another one; the sum of terms up to it."""
         if (rest, frame) not in self.sweeps:
-            sweep, steps = Sweep(), self.tree.way(rest, frame)
-            if steps:
+            turning, total = (np.zeros((n, len(self.slices))) for n in (4, 6))
+            if steps := self.tree.way(rest, frame):
                 number, up = steps[-1]
-                joint = self.tree.joints[number]
-                sweep = self.sweep(rest, number + 1 if up else joint.parent)
-                sweep = sweep.past(joint, up, self.rates[number])
-            self.sweeps[rest, frame] = sweep
+                joint, value = self.tree.joints[number], self.bounds[number]
+                before = self.sweep(rest, number + 1 if up else joint.parent)
+                turning, total = (x.copy() for x in before)
+                turning[2:] += [[joint.turn_error], [joint.turn_error + joint.tilt]]
+                turning[:2] += value[1:] if joint.kind == TURNS else 0.0
+                if joint.lever > 0.0:
+                    shift = (joint.lever, 0.0, 0.0)
+                    total += terms(shift, turning if up else before[0])
+                if joint.kind == SLIDES:
+                    total += terms(value, turning)
+            self.sweeps[rest, frame] = turning, total
         return self.sweeps[rest, frame]
+
+    def moves(self, rest: int, frame: int, far: Any, at: Any = ...) -> tuple[Any, Any]:
+        """W, A, E and C of a frame, and the sum of terms of points that it carries.
+
+        Args:
+            rest: The frame that it is seen from.
+            frame: The frame.
+            far: How far the points lie from its origin, shape (k,) or one for all; [m].
+            at: Numbers of slices, shape (m,); all if none are given.
+
+        Returns:
+            Shapes (4, m, 1) and (6, m, k).
+        """
+        turning, total = (x[:, at, None] for x in self.sweep(rest, frame))
+        return turning, total + terms((far, 0.0, 0.0), turning)
 
     def reach(self, body: Any, rest: int, at: Any, n: Any) -> tuple[Any, Any]:
         """Largest n.x over a body, slices and all errors, as seen from a frame.
@@ -334,13 +303,12 @@ class Slices:
         if solid.disc_radius > 0.0:
             away = np.linalg.norm(np.cross(seen, solid.disc_axis), axis=2)
             heights += solid.disc_radius * away[:, :, None]
-        every, sweep = self.widths.shape, self.sweep(rest, body.frame)
-        sweep = Sweep(*(np.broadcast_to(x, every)[at, None] for x in sweep))
-        sweep, h = sweep.at(solid.levers), self.widths[at, None]
-        more = (sweep.bend + sweep.tilting) * h * h / 8.0 + h * sweep.drift / 2.0
-        more = more + sweep.second + solid.disc_radius * sweep.turned
-        more = more + self._strayed(body, rest, at, n)
-        size = np.abs(origins).max() + solid.extent + (more + sweep.first).max(axis=1)
+        turning, total = self.moves(rest, body.frame, solid.levers, at)
+        (_, bend, tilting, drift, first, second), h = total, self.widths[at, None]
+        more = (bend + tilting) * h * h / 8.0 + h * drift / 2.0
+        more += second + solid.disc_radius * turning[3]
+        more += self._strayed(body, rest, at, n)
+        size = np.abs(origins).max() + solid.extent + (more + first).max(axis=1)
         return (heights.max(axis=1) + more).max(axis=1), size
 
     def _strayed(self, body: Any, rest: int, at: Any, n: Any) -> Any:

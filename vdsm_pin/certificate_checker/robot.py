@@ -15,7 +15,14 @@ from flint import arb, arb_mat
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.certificate_checker.balls import SLACK, Ball, belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
-from vdsm_pin.certificate_checker.motion import Branch, Path, always, beside, derivative
+from vdsm_pin.certificate_checker.motion import (
+    Branch,
+    Path,
+    always,
+    beside,
+    columns_of,
+    derivative,
+)
 from vdsm_pin.certificate_checker.solids import (
     CUBE,
     Body,
@@ -62,7 +69,7 @@ def numbers(words: str) -> list[float]:
 
 
 def placed(element: ET.Element) -> list[list[Ball]]:
-    """Three rows of T_parent_element."""
+    """T_parent_element."""
     origin = element.find("origin")
     words = {} if origin is None else origin.attrib
     turned = arb_mat(3, 3, 1)
@@ -73,7 +80,7 @@ def placed(element: ET.Element) -> list[list[Ball]]:
         one[i, j], one[j, i] = -sine, sine
         turned = one * turned
     rows = zip(turned.tolist(), numbers(words.get("xyz", "0 0 0")), strict=True)
-    return [[*row, arb(shift)] for row, shift in rows]
+    return [*([*row, arb(shift)] for row, shift in rows), [0, 0, 0, 1]]
 
 
 class Model:
@@ -209,7 +216,7 @@ class Model:
     def solids(self, link: ET.Element, name: str, covers: Any) -> Iterator[Solid]:
         """The convex pieces of a link; of each mesh as the certificate has it."""
         for collision in link.findall("collision"):
-            *axes, shift = np.array([[*map(float, x)] for x in placed(collision)]).T
+            *axes, shift = np.array(placed(collision), float)[:3].T
             for shape in collision.findall("geometry/*"):
                 if shape.tag == "mesh":
                     mesh = read_mesh(self._mesh(shape))
@@ -357,7 +364,8 @@ class Robot:
         for k in range(self.own.size):
             self.place, ends = f"interval {k}", self.own.times[k : k + 2].tolist()
             step = arb(ends[-1]) - arb(ends[0])
-            columns = self.own.controls(k)
+            controls = self.own.controls(k)
+            columns = columns_of(controls)
             for joint, points in zip(self.model.moved, columns, strict=True):
                 told = f"joint {joint.name!r} leaves its limits"
                 claim(within(points, joint.lower, joint.upper), told)
@@ -366,7 +374,7 @@ class Robot:
                     told = f"joint {joint.name!r} leaves the limit of its rates"
                     points = [q / step for q in derivative(points)]  # noqa: PLW2901
                     # Rates of straight lines change at once.
-                    kept = order < len(columns[0]) and within(points, -most, most)
+                    kept = order < len(controls) and within(points, -most, most)
                     claim(kept or most == np.inf, told)
 
 

@@ -18,10 +18,16 @@ from vdsm_pin.certificate_checker.balls import (
     dot,
     norm,
 )
-from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, always, part
+from vdsm_pin.certificate_checker.motion import (
+    Interval,
+    Slices,
+    always,
+    columns_of,
+    part,
+)
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.certificate_checker.solids import Pair
-from vdsm_pin.certificate_checker.tree import Pose, frame_of
+from vdsm_pin.certificate_checker.tree import Pose, frame_of, point_of
 from vdsm_pin.problem.planning_problem import Posture
 from vdsm_pin.problem.trajectory import Trajectory
 
@@ -68,7 +74,7 @@ class Rows:
 
     def _limits(self, motion: Interval) -> None:
         """Check the control points, and the change from row to row."""
-        arm, columns = self.problem.manipulator, motion.controls
+        arm, columns = self.problem.manipulator, columns_of(motion.controls)
         if (most := self.problem.max_row_change) is not None:
             n = PARTS if motion.degree > 1 else 1
             times = [(arb(k) / n, arb(k + 1) / n) for k in range(n)]
@@ -106,8 +112,7 @@ class Rows:
             self._draw(self.drawing, rows, motion, tips)
 
     def _tip(self, motion: Interval, time: float) -> Matrix:
-        origin, turned = motion.pose(time)[self.link]
-        return origin + turned * column(self.last, 0, 0)
+        return point_of(motion.pose(time)[self.link], self.last, 0, 0)
 
     def _end(self, name: str, end: Posture | None, row: int, tip: Matrix) -> None:
         """Check a row at the start or goal: its tip, and joints that are stated."""
@@ -144,9 +149,9 @@ class Rows:
         parts = len(tips) - 1
         times = [(k / parts, (k + 1) / parts) for k in range(parts)]
         slices = Slices(motion.tree, [(motion, *both) for both in times])
-        bends = slices.sweep(0, self.link).at(self.last).bend / (8 * parts**2)
-        for k, bend in enumerate(bends.tolist()):
-            drawing.draw(begin, run / parts, tips[k : k + 2], bend)
+        bends = slices.moves(0, self.link, self.last)[1][1].ravel().tolist()
+        for k, bend in enumerate(bends):
+            drawing.draw(begin, run / parts, tips[k : k + 2], bend / (8 * parts**2))
 
     def _look(
         self, drawing: Drawing, motion: Interval, way: tuple[Ball, Ball], times: Any
@@ -165,15 +170,15 @@ class Rows:
         while slices:
             times = slices.pop()
             h = times[1] - times[0]
-            moves = Slices(motion.tree, [(motion, *times)]).sweep(0, self.link)
-            moves = Sweep(*(float(np.max(x)) for x in moves.at(self.last)))
+            moves = Slices(motion.tree, [(motion, *times)])
+            turning, total = moves.moves(0, self.link, self.last)
             speed, off = drawing.steepest * abs(run), 0.0
             if drawing.target is not None:
-                speed, off = moves.speed, moved
+                speed, off = total[0].item(), moved
             ends = [self._seen(drawing, motion, t, begin + run * t) for t in times]
             angle, away = (sum(both) / 2 for both in zip(*ends, strict=True))
             nearest = away - speed * h / 2
-            worst = angle + moves.turn * h / 2 + astray
+            worst = angle + turning[0].item() * h / 2 + astray
             if nearest > off:
                 worst += speed * h / nearest / 2 + off / (nearest - off)
                 if worst <= limit:
@@ -192,7 +197,7 @@ class Rows:
         """
         rail, *joints = motion.tree.joints
         lever = sum(map(arb, self.arm.lengths), arb(0))
-        x0 = max(motion.controls[0], key=lambda q: float(abs(q)))
+        x0 = max(columns_of(motion.controls)[0], key=lambda q: float(abs(q)))
         turned, moved = arb(rail.tilt), rail.slip + rail.tilt * (abs(x0) + lever)
         sines = [(arb(one.turn_error) / 2).sin() ** 2 for one in joints]
         both = zip(sines[::2], sines[1::2], self.arm.lengths, strict=True)
@@ -205,7 +210,7 @@ class Rows:
         self, drawing: Drawing, motion: Interval, time: float, station: Ball
     ) -> tuple[Ball, Ball]:
         """Angle of the last link to where it shall look, and how far away that is."""
-        axis = motion.pose(time)[self.link][1] * column(1, 0, 0)
+        axis = column(*motion.pose(time)[self.link].entries()[::4][:3])
         aim = drawing.aim(station, self._tip(motion, time))
         return arb.atan2(norm(cross(axis, aim)), dot(axis, aim)), norm(aim)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from vdsm_pin.certificate_checker.balls import UP, claim, column, dot, unit
 from vdsm_pin.certificate_checker.inside import Surface
+from vdsm_pin.certificate_checker.tree import point_of
 from vdsm_pin.geometry import solids
 from vdsm_pin.problem import scene
 
@@ -203,13 +204,12 @@ class Mesh(Solid):
         """Check that points are not inside.
 
         Args:
-            rest: The pose of its frame: origin and rotation.
-            points: Of each that of another frame, the point there, and how far from the
+            rest: How its frame stands.
+            points: Of each how its frame stands, the point there, and how far from the
                 triangles it stays.
         """
-        zero, axes = rest
-        for (origin, turned), at, off in () if self.surface_only else points:
-            seen = axes.transpose() * (origin + turned * at - zero)
+        for frame, at, off in () if self.surface_only else points:
+            seen = point_of(rest.inv() * frame, *at)
             why = self.surface.not_outside([*map(float, seen.entries())], off)
             claim(not why, f"a body is not proved outside {self.name}: {why}")
 
@@ -309,5 +309,5 @@ class Pair(NamedTuple):
     def inner(self, pose: Any) -> tuple[Any, Any, float]:
         """The body's frame, its middle there, and how far off the other it stays."""
         solid = self.body.solid
-        middle = column(*solid.points[0].mean(axis=0).tolist())
+        middle = solid.points[0].mean(axis=0).tolist()
         return pose[self.body.frame], middle, solid.radius + self.required

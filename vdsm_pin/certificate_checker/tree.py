@@ -1,7 +1,7 @@
 """Trees of joints: how their frames stand in the world (docs/certificate.md).
 
 A tree is a list of joints, parents first. Joint j, from 0, carries frame j + 1; frame 0
-is the world. A frame stands as a pair of its origin and its rotation.
+is the world. How a frame stands is a matrix of shape (4, 4).
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from flint import arb, arb_mat
 
 from vdsm_pin.certificate_checker.balls import UP, Ball, Matrix, column, norm, unit
 
-Pose: TypeAlias = list[tuple[Matrix, Matrix]]
+Pose: TypeAlias = list[Matrix]  # T_world_frame of every frame
 
 FIXED, TURNS, SLIDES = "FIXED", "REVOLUTE", "PRISMATIC"
 
@@ -41,19 +41,17 @@ class Joint:
     ) -> None:
         self.parent, self.kind = parent, kind
         self.column, self.ratio, self.offset = moves[0], *map(arb, moves[1:])
-        rows = [[*row] for row in placement]
-        self.shift = column(*(row[3] for row in rows[:3]))
-        turned = [row[:3] for row in rows[:3]]
-        self.rotation = None if turned == np.eye(3).tolist() else arb_mat(turned)
-        self.lever = float(norm(self.shift)) * UP
-        self.axis = unit(column(*map(float, axis)))
-        along = self.axis if self.rotation is None else self.rotation * self.axis
-        line = [[*map(float, x.entries())] for x in (self.shift, along)]
-        self.line = np.array(line).T  # shift and axis in the frame that it hangs on
         self.gain, self.past = abs(moves[1]), UP * abs(moves[2])
-        x, y, z = self.axis.entries()
-        self.cross = arb_mat([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        self.square = self.cross * self.cross
+        self.placement = arb_mat([[*row] for row in placement])
+        self.lever = float(norm(point_of(self.placement, 0, 0, 0))) * UP
+        x, y, z = unit(column(*map(float, axis))).entries()
+        twist = [[0, 0, 0, x], [0, 0, 0, y], [0, 0, 0, z], [0] * 4]
+        if kind == TURNS:
+            twist = [[0, -z, y, 0], [z, 0, -x, 0], [-y, x, 0, 0], [0] * 4]
+        self.first = self.placement * arb_mat(twist)
+        self.second = self.first * arb_mat(twist)
+        line = self.placement * arb_mat([[0, x], [0, y], [0, z], [1, 0]])
+        self.line = np.array(line.tolist()[:3], float)  # where it stands, and its axis
         self.err(*errors)
 
     def err(self, value: float, moved: float, tilt: float) -> None:
@@ -61,6 +59,34 @@ class Joint:
         value, moved, self.tilt = UP * value, UP * moved, UP * tilt
         self.turn_error = value if self.kind == TURNS else 0.0
         self.slip = moved + (value if self.kind == SLIDES else 0.0)
+
+    def carries(self, q: Sequence[Ball]) -> Matrix:
+        """T_parent_frame at a row of q: by the exponential of its twist."""
+        value = self.offset
+        if self.column is not None:
+            value = self.ratio * q[self.column] + value
+        if self.kind == FIXED:
+            return self.placement
+        if self.kind == SLIDES:
+            return self.placement + self.first * value
+        sine, cosine = value.sin_cos()
+        return self.placement + self.first * sine + self.second * (1 - cosine)
+
+    def bounds(self, columns: Any) -> Any:
+        """Bounds of its value, rate and how fast that changes, shape (3, n).
+
+        Args:
+            columns: Those of the columns of q, shape (n_columns, 3, n).
+        """
+        found = np.array([[self.past], [0.0], [0.0]])
+        return (
+            found if self.column is None else found + self.gain * columns[self.column]
+        )
+
+
+def point_of(frame: Matrix, x: Ball, y: Ball, z: Ball) -> Matrix:
+    """Where a point of a frame stands."""
+    return column(*(frame * arb_mat(4, 1, [x, y, z, 1])).entries()[:3])
 
 
 def frame_of(link: int) -> int:
@@ -91,24 +117,9 @@ class Tree:
 
     def pose(self, q: Sequence[Ball]) -> Pose:
         """All frames at a row of q."""
-        still = arb_mat(3, 3, 1)
-        frames = [(column(0, 0, 0), still)]
+        frames = [arb_mat(4, 4, 1)]
         for joint in self.joints:
-            origin, turned = frames[joint.parent]
-            if joint.lever > 0.0:
-                origin = origin + turned * joint.shift
-            if joint.rotation is not None:
-                turned = turned * joint.rotation
-            value = joint.offset
-            if joint.column is not None:
-                value = joint.ratio * q[joint.column] + value
-            if joint.kind == TURNS:
-                sine, cosine = value.sin_cos()
-                turn = still + joint.cross * sine + joint.square * (1 - cosine)
-                turned = turned * turn
-            elif joint.kind == SLIDES:
-                origin = origin + turned * (joint.axis * value)
-            frames.append((origin, turned))
+            frames.append(frames[joint.parent] * joint.carries(q))
         return frames
 
     def way(self, rest: int, frame: int) -> list[tuple[int, bool]]:
