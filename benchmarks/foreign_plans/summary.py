@@ -67,7 +67,8 @@ def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
         "Certificates of the plans that are certified, and how long the separate "
         "program checks them. Grazing: each of these plans once more with a required "
         "clearance 2 um below its least one and once 2 um above; answered where the "
-        "one is certified and the other refuted. The longer of both times.",
+        "one is certified and the other refuted. The longer of both times, each the "
+        "least of three.",
         _table(PROOFS, filter(None, map(_proofs, groups))),
         described(surroundings()).rstrip(".") + f", {_ompl()}.",
     ]
