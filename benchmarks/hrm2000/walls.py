@@ -121,7 +121,7 @@ def port(rng: Rng, arm: Manipulator) -> Draft:
 
 
 def blades(rng: Rng, arm: Manipulator) -> Draft:
-    """Between two blades of a stator, each a mesh, with hub and casing."""
+    """Through a ring of blades, each a mesh, between a hub and a casing."""
     curve = random_curve(rng, arm, 2, (8.0, 24.0), (0.06, 0.2))
     witness = fed_and_drawn(rng, arm, curve, rng.uniform(0.45, 0.6), (0.012, 0.03))
     swept, length = sweep(witness), arm.total_length
