@@ -33,10 +33,13 @@ class Deadline:
     Args:
         limit: The time limit as it was given; infinite for none; [s].
         end: The end by the monotonic clock of the machine; [s].
+        patience: How long a search goes on that has found nothing, by its own begin,
+            if it may go on until then at all; [s].
     """
 
     limit: float = inf
     end: float = inf
+    patience: float = inf
 
     @classmethod
     def after(cls, seconds: float | None) -> "Deadline":

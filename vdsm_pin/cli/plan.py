@@ -3,13 +3,14 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 
 import typer
 
 from vdsm_pin.cli import options
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
-from vdsm_pin.time_limit import Deadline, enforced
+from vdsm_pin.time_limit import PLAN_LIMIT, Deadline, enforced
 
 commands = options.Family()
 
@@ -68,7 +69,8 @@ def _planning(limit: float | None) -> Iterator[Deadline]:
 
     compiles, begin = limit is None and is_cold(), time.monotonic()
     try:
-        yield Deadline.after(default_limit() if limit is None else limit)
+        deadline = Deadline.after(default_limit() if limit is None else limit)
+        yield replace(deadline, patience=PLAN_LIMIT) if compiles else deadline
     except (Infeasible, OutOfTime) as error:
         if isinstance(error, OutOfTime | NoPlanFound):
             error.heading = "no plan found: "

@@ -174,7 +174,11 @@ def _to_joints(
             if isinstance(error, OutOfTime) and not turned:
                 raise
             side = "back from the goal" if turned else "from the start"
-            reasons.append(f"planned {side}: {error}")
+            why: object = error
+            if isinstance(error, OutOfTime):
+                side += ", with half of the time"
+                why = error.reached or "nothing was found"
+            reasons.append(f"planned {side}: {why}")
             continue
         rows = _joined(known, clearance, plan.trajectory.joints, end, need)
         if rows is None:

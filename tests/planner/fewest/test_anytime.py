@@ -6,6 +6,8 @@ over, as do all that follow.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import islice
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,16 +15,22 @@ import pytest
 from vdsm_pin.errors import NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.fewest import explore
+from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.levels import (
+    FIRST,
     FULL,
     QUICK,
+    Effort,
     Insert,
     Search,
+    later_levels,
     leaning,
     pointed,
 )
 from vdsm_pin.planner.fewest.strategy import (
     CLEAREST,
+    FEWEST,
     _Search,
     plan_clearest,
     plan_fewest,
@@ -32,8 +40,10 @@ from vdsm_pin.planner.largest_margin import drawn_length, widest
 from vdsm_pin.planner.paper.clearest import plan_paper_clearest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Plan
+from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
@@ -166,3 +176,46 @@ def test_a_better_plan_is_looked_for_by_roadmaps_alone() -> None:
     for effort in (pointed(FULL), leaning(FULL)):
         inserts = [one for one in effort.levels if isinstance(one, Insert)]
         assert inserts and all(one.directed for one in inserts) and effort.proves
+
+
+@pytest.mark.parametrize("limit", [None, 60.0])
+def test_a_search_goes_on_until_its_time_is_over(
+    limit: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The insertions of an effort fail here: the ones after them are of the time."""
+    task, levels, tried = read_problem("paper/free"), (FIRST[0],), []
+
+    def failing(*asked: Any) -> Any:
+        tried.append(asked[4])
+        return (None, None) if asked[4] in levels else insert(*asked)
+
+    monkeypatch.setattr(explore, "insert", failing)
+    within = within_time(link_clearance(task), Deadline.after(limit))
+    searched = _Search.of(task, within, NO_MARGIN, "fewest", FEWEST)
+    if limit is None:
+        with pytest.raises(NoPlanFound):
+            searched.plan(Effort(levels, proves=True))
+        assert set(tried) == set(levels)
+    else:
+        plan = searched.plan(Effort(levels, proves=True))
+        assert drawn_length(plan) == pytest.approx(task.path.length)
+        assert [level.seed for level in tried if level not in levels] == [1]
+
+
+def test_later_insertions_differ_from_each_other_and_from_all_before() -> None:
+    for effort in (FULL, pointed(FULL), leaning(FULL)):
+        later = list(islice(later_levels(effort.levels), 30))
+        assert len({*later, *effort.levels}) == 30 + len(effort.levels)
+        assert later == list(islice(later_levels(effort.levels), 30))
+        if not any(isinstance(one, Search) for one in effort.levels):
+            assert all(isinstance(one, Insert) and one.directed for one in later)
+    assert not list(later_levels(QUICK.levels))
+
+
+def test_a_search_that_compiles_ends_after_its_patience() -> None:
+    task = read_problem("paper/free")
+    hurried = replace(Deadline.after(600.0), patience=0.0)
+    within = within_time(link_clearance(task), hurried)
+    nothing = Effort((replace(FIRST[0], cells=1),), proves=True)
+    with pytest.raises(NoPlanFound):
+        _Search.of(task, within, NO_MARGIN, "fewest", FEWEST).plan(nothing)

@@ -1,11 +1,13 @@
 """From coarse to fine: which searches are run, in which order, and when to stop.
 
 Searches are counted, not timed: without a time limit the same problem gives the same
-plan. A limit ends them, and puts proofs off.
+plan. A limit ends them, and puts proofs off. Within a limit a search that has not drawn
+all goes on with insertions of other chance until it ends.
 """
 
 import itertools
 import logging
+import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -28,6 +30,7 @@ from vdsm_pin.planner.fewest.levels import (
     Level,
     Search,
     confined_first,
+    later_levels,
 )
 from vdsm_pin.planner.fewest.roadmap import CostWeights, build_roadmap
 from vdsm_pin.planner.fewest.route import tip_route
@@ -175,6 +178,8 @@ class _Exploration:
     ) -> None:
         self.problem, self.clearance, self.margin = problem, clearance, margin
         self.weights, self.levels = weights, effort.levels
+        self.later, self.proves = later_levels(effort.levels), effort.proves
+        self.begin = time.monotonic()
         self.spaces: dict[tuple[float, float, int], TipSpace] = {}
         self.rows, self.room = path_rows(problem.path), Room(0.0, 0.0)
         self.bare = clearance.bare  # nothing is impossible for a margin
@@ -182,7 +187,7 @@ class _Exploration:
         first = self._judge(self.levels[0])
         self.best = Explored(first, None, self.rows, self.proof)
         self.proofs: tuple[Proving, ...] = (_CutOff(self.best), _hemmed_in)
-        self.proofs = self.proofs if effort.proves else ()
+        self.proofs = self.proofs if self.proves else ()
         self.no_way_out: NoWayOut | None = None
 
     def run(self, soon: Deadline) -> Iterator[Explored]:
@@ -212,6 +217,26 @@ class _Exploration:
             yield self.best
         if self.no_way_out and self.best.found is None and self.best.stuck is None:
             raise self.no_way_out
+        yield from self._until_the_end(soon)
+
+    def _until_the_end(self, soon: Deadline) -> Iterator[Explored]:
+        """What is known after each insertion for which there is time besides.
+
+        Which ones there are does not depend on the time, which only ends them.
+        """
+        deadline = self.clearance.deadline
+        if not self.proves or deadline.end == np.inf:
+            return
+        for level in self.later:
+            over = time.monotonic() - self.begin > deadline.patience
+            if over or (self.best.found and soon.passed):
+                return
+            now = self._searched(level, soon)
+            self.best = now if now.beats(self.best) else self.best
+            self.best = replace(self.best, stuck=now.stuck)
+            yield self.best
+            if not self.best.missing > 0.0:
+                return
 
     def _next_level(self) -> Level:
         """The next level, off the list of those that are left."""

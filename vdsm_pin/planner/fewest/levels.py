@@ -1,5 +1,7 @@
 """How finely to look: what each search of the exploration may use up."""
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -127,6 +129,28 @@ and beside the path too. Where the path is confined, the arm is inserted: with a
 knees as it takes, and with more and more arms tried. The last ones of both kinds are
 fine. The numbers were found by trial on the paper's problems and HRM-2000.
 """
+
+
+LATER: Final = (30, 60, 120)
+"""Populations of the insertions that go on until the time is over."""
+
+
+def later_levels(levels: tuple[Level, ...]) -> Iterator[Level]:
+    """Insertions for as long as there is time, each of other chance.
+
+    Args:
+        levels: What is tried before; without insertions none is tried later.
+    """
+    inserts = [one for one in levels if isinstance(one, Insert)]
+    if not inserts:
+        return
+    seed = max(one.seed for one in inserts)
+    for number in itertools.count(1):
+        population = LATER[number % len(LATER)]
+        both = _both(population, routes=6, backtracks=6, seed=seed + number)
+        for one in both:
+            if one.directed or not all(each.directed for each in inserts):
+                yield one
 
 
 def confined_first(levels: tuple[Level, ...]) -> tuple[Level, ...]:
