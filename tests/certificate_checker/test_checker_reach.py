@@ -9,7 +9,7 @@ import pytest
 from flint import arb
 from oracles.tree_certificates import controls
 
-from vdsm_pin.certificate_checker.balls import Ball, column, cross, dot, norm
+from vdsm_pin.certificate_checker.balls import column, cross, dot, norm
 from vdsm_pin.certificate_checker.motion import Branch, Interval, Slices
 from vdsm_pin.certificate_checker.solids import Body, Solid, away
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
@@ -94,7 +94,7 @@ def test_rates_of_a_part_are_those_within_it(part: tuple[float, float]) -> None:
     assert found[:, 0] == pytest.approx([6.0 * end**2, 12.0 * end, 12.0], rel=1e-11)
 
 
-def exact(point: Any) -> Ball:
+def exact(point: Any) -> arb:
     """The length of a vector of doubles."""
     return norm(column(*point.tolist()))
 

@@ -19,7 +19,7 @@ import numpy as np
 import yaml
 from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import Ball, Matrix, column, dot, unit
+from vdsm_pin.certificate_checker.balls import column, dot, unit
 
 NUMBER: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 HRM8: Final = {
@@ -47,26 +47,26 @@ def require(holds: object, problem: str) -> None:
 class Hull:
     """Hull of points, rows of three, grown by a radius; [m]."""
 
-    points: list[list[Ball]]
-    radius: Ball
+    points: list[list[arb]]
+    radius: arb
 
 
 @dataclass(frozen=True)
 class FlatCylinder:
     """Solid cylinder with flat ends; [m]."""
 
-    centre: Matrix
-    axis: Matrix
-    half_length: Ball
-    radius: Ball
+    centre: arb_mat
+    axis: arb_mat
+    half_length: arb
+    radius: arb
 
 
 @dataclass(frozen=True)
 class HalfSpace:
     """Points with normal.p <= offset; [m]."""
 
-    normal: Matrix
-    offset: Ball
+    normal: arb_mat
+    offset: arb
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class SweptPolygon:
     """A prism: section, exact in the file's unit, and its ends in space; [m]."""
 
     section: list[tuple[Fraction, Fraction]]
-    ends: tuple[list[list[Ball]], list[list[Ball]]]
+    ends: tuple[list[list[arb]], list[list[arb]]]
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ class Triangles:
     """A mesh file's triangles, (m, 3, 3), with x_base = linear x_file + shift."""
 
     corners: Any
-    linear: Matrix
-    shift: Matrix
+    linear: arb_mat
+    shift: arb_mat
 
 
 Shape: TypeAlias = Hull | FlatCylinder | HalfSpace | SweptPolygon | Triangles
@@ -94,8 +94,8 @@ class Row:
     """One row of a trajectory; `joints` are x0, alpha1, theta1, ..; [m], [rad]."""
 
     on_path: bool
-    path_m: Ball
-    joints: list[Ball]
+    path_m: arb
+    joints: list[arb]
 
 
 def _unique(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
@@ -143,19 +143,19 @@ def _read_mesh(content: bytes, is_obj: bool) -> Any:
     return np.array(corners)[np.array(order, dtype=int).reshape(-1, 3)]
 
 
-def _real(text: str) -> Ball:
+def _real(text: str) -> arb:
     good = isinstance(text, str) and NUMBER.fullmatch(text) and isfinite(float(text))
     require(good, f"{text!r} is not a finite number")
     return arb(float(text))
 
 
-def _reals(texts: Any, count: int) -> list[Ball]:
+def _reals(texts: Any, count: int) -> list[arb]:
     good = isinstance(texts, list | tuple) and len(texts) == count
     require(good, f"{texts!r} is not a list of {count} numbers")
     return [_real(text) for text in texts]
 
 
-def turn(axis: int, angle: Ball) -> Matrix:
+def turn(axis: int, angle: arb) -> arb_mat:
     """Rotation about x, y or z (0, 1, 2)."""
     matrix, i, j = arb_mat(3, 3, 1), (axis + 1) % 3, (axis + 2) % 3
     sine, cosine = angle.sin_cos()
@@ -163,7 +163,7 @@ def turn(axis: int, angle: Ball) -> Matrix:
     return matrix
 
 
-def _rotation(rpy_deg: Any) -> Matrix:
+def _rotation(rpy_deg: Any) -> arb_mat:
     x, y, z = (angle * arb.pi() / 180 for angle in _reals(rpy_deg, 3))
     return turn(2, z) * turn(1, y) * turn(0, x)
 
@@ -217,24 +217,24 @@ class Problem:
         _use_up(data, "the problem", "vdsm_problem", "name", *FREE)
         self.sha256 = self._hash.hexdigest()
 
-    def _length(self, text: Any) -> Ball:
+    def _length(self, text: Any) -> arb:
         return _real(text) * self._unit
 
-    def _size(self, text: Any) -> Ball:
+    def _size(self, text: Any) -> arb:
         require(_real(text) > 0, f"{text} is not above 0")
         return self._length(text)
 
-    def _lengths(self, texts: Any) -> Matrix:
+    def _lengths(self, texts: Any) -> arb_mat:
         return column(*_reals(texts, 3)) * self._unit
 
-    def _inward(self, vector: Matrix) -> Matrix:
+    def _inward(self, vector: arb_mat) -> arb_mat:
         """A direction of the file in the base frame."""
         return self._turn.transpose() * vector
 
-    def _point(self, texts: Any) -> Matrix:
+    def _point(self, texts: Any) -> arb_mat:
         return self._inward(self._lengths(texts) - self._origin)
 
-    def _read_arm(self, arm: dict[str, Any], length_unit: Ball) -> None:
+    def _read_arm(self, arm: dict[str, Any], length_unit: arb) -> None:
         texts = arm.pop("link_lengths")
         self.lengths = [x * length_unit for x in _reals(texts, len(texts))]
         self.radius = _real(arm.pop("link_radius")) * length_unit

@@ -5,12 +5,9 @@ where they are certain: rounding can reject a certificate and never accept one.
 """
 
 from math import isfinite
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
-from flint import arb_mat
-
-Ball: TypeAlias = Any  # flint.arb and flint.arb_mat carry no types
-Matrix: TypeAlias = Any  # a vector is a column
+from flint import arb, arb_mat
 
 MM: Final = 1000  # messages tell lengths in millimetres
 SLACK: Final = 1e-9  # limits may be passed by this; [m], [rad], [-]
@@ -22,7 +19,7 @@ class Rejected(Exception):
     """A claim is false or missing."""
 
 
-def claim(holds: object, reason: str, *numbers: Ball) -> None:
+def claim(holds: object, reason: str, *numbers: Any) -> None:
     """Reject a certificate unless something certain holds.
 
     Raises:
@@ -48,28 +45,33 @@ def belongs(header: Any, keys: str, problem: str, trajectory: str) -> None:
         claim(header[f"{kind}_sha256"] == sha256, f"is of another {kind} file")
 
 
-def column(x: Ball, y: Ball, z: Ball) -> Matrix:
+def column(x: Any, y: Any, z: Any) -> arb_mat:
     """A vector of balls or doubles."""
     return arb_mat(3, 1, [x, y, z])
 
 
-def dot(a: Matrix, b: Matrix) -> Ball:
+def dot(a: arb_mat, b: arb_mat) -> arb:
     """Scalar product."""
     return (a.transpose() * b)[0, 0]
 
 
-def cross(a: Matrix, b: Matrix) -> Matrix:
+def cross(a: arb_mat, b: arb_mat) -> arb_mat:
     """Vector product."""
     (ax, ay, az), (bx, by, bz) = a.entries(), b.entries()
     return column(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
 
 
-def norm(a: Matrix) -> Ball:
+def norm(a: arb_mat) -> arb:
     """Length of a vector."""
     return dot(a, a).nonnegative_part().sqrt()
 
 
-def unit(a: Matrix) -> Matrix:
+def angle(a: arb_mat, b: arb_mat) -> arb:
+    """Between two vectors; [rad]."""
+    return arb.atan2(norm(cross(a, b)), dot(a, b))
+
+
+def unit(a: arb_mat) -> arb_mat:
     """A vector scaled to length 1."""
     length = norm(a)
     claim(length > 0, "a direction has length 0")

@@ -13,14 +13,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import UP, Ball, Matrix, claim
+from vdsm_pin.certificate_checker.balls import UP, claim
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Pose, Tree, hung
 from vdsm_pin.problem.scene import Moving
 
 Points: TypeAlias = Sequence[Any]  # control points: rows of q, or of one column
 
 
-def row(values: Any) -> Matrix:
+def row(values: Any) -> arb_mat:
     """A row of doubles in balls."""
     return arb_mat([values.tolist()])
 
@@ -30,14 +30,14 @@ def columns_of(points: Points) -> list[Points]:
     return [*zip(*(point.entries() for point in points), strict=True)]
 
 
-def blossom(points: Points, shares: Sequence[Ball]) -> Any:
+def blossom(points: Points, shares: Sequence[arb]) -> Any:
     """De Casteljau's value of control points, each step at a share of its own."""
     for share in shares:
         points = [a + (b - a) * share for a, b in pairwise(points)]
     return points[0]
 
 
-def part(points: Points, low: Ball, high: Ball) -> Points:
+def part(points: Points, low: arb, high: arb) -> Points:
     """Control points of a part [low, high] of [0, 1]."""
     n = len(points) - 1
     return [blossom(points, [low] * (n - i) + [high] * i) for i in range(n + 1)]

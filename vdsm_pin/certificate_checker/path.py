@@ -3,9 +3,9 @@
 from bisect import bisect_right
 from itertools import pairwise
 
-from flint import arb
+from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import Ball, Matrix, column, norm
+from vdsm_pin.certificate_checker.balls import column, norm
 from vdsm_pin.problem.desired_path import DesiredPath
 
 
@@ -24,42 +24,42 @@ class Drawing:
         for a, b in pairwise(self.corners):
             self.stations.append(self.stations[-1] + norm(b - a))
         self.length, self.deviation = self.stations[-1], arb(0)
-        self.stretches: list[tuple[Ball, Ball]] = []
-        self.last: Ball | None = None  # station of the row before; None off the path
-        self.here: Ball | None = None  # station of the latest row on the path
+        self.stretches: list[tuple[arb, arb]] = []
+        self.last: arb | None = None  # station of the row before; None off the path
+        self.here: arb | None = None  # station of the latest row on the path
         # How far drawn from the first row on the path; how far the latest lies behind.
         self.farthest = self.behind = arb(0)
         self.left = False  # whether rows off the path lie in between
         self.looks = looks = path.pointing
         self.target = None if looks is None else looks.target
-        self.aims = list[Matrix]()  # where the last link shall look at each corner
+        self.aims = list[arb_mat]()  # where the last link shall look at each corner
         if looks is not None and looks.directions is not None:
             self.aims = [column(*one) for one in looks.directions.tolist()]
             self.aims *= len(self.corners) if len(self.aims) == 1 else 1
 
-    def laps(self, station: Ball) -> int:
+    def laps(self, station: arb) -> int:
         """Whole laps in a station; the nearest number where that is not certain."""
         laps = station / self.length if self.closed else arb(0)
         whole = laps.floor().unique_fmpz()
         return round(float(laps)) if whole is None else int(whole)
 
-    def local(self, station: Ball) -> Ball:
+    def local(self, station: arb) -> arb:
         """The station within [0, length]."""
         if self.closed:
             return station - self.laps(station) * self.length
         return station.max(arb(0)).min(self.length)
 
-    def point(self, station: Ball) -> Matrix:
+    def point(self, station: arb) -> arb_mat:
         """The point of the path at a station."""
         return self._blend(self.corners, station)
 
-    def aim(self, station: Ball, tip: Matrix) -> Matrix:
+    def aim(self, station: arb, tip: arb_mat) -> arb_mat:
         """Along which the last link shall look there, of any length."""
         if self.target is None:
             return self._blend(self.aims, station)
         return column(*self.target.tolist()) - tip
 
-    def _blend(self, values: list[Matrix], station: Ball) -> Matrix:
+    def _blend(self, values: list[arb_mat], station: arb) -> arb_mat:
         """Vectors given at the corners, straight from each to the next one."""
         s, last = self.local(station), len(self.corners) - 2
         if last < 0:
@@ -68,18 +68,18 @@ class Drawing:
         a, b = values[i : i + 2]
         return a + (b - a) * ((s - self.stations[i]) / self._side(i))
 
-    def _side(self, i: int) -> Ball:
+    def _side(self, i: int) -> arb:
         return norm(self.corners[i + 1] - self.corners[i])
 
     @property
-    def steepest(self) -> Ball:
+    def steepest(self) -> arb:
         """How much the aim changes at most per length of path."""
         found = arb(0)
         for i, (a, b) in enumerate(pairwise(self.aims)):
             found = found.max(norm(b - a) / self._side(i))
         return found
 
-    def step(self, a: Ball, b: Ball) -> Ball:
+    def step(self, a: arb, b: arb) -> arb:
         """How far an interval between two stations advances.
 
         The shorter way round; forwards where both are as long, as at an exact tie.
@@ -88,7 +88,7 @@ class Drawing:
             return self.local(b) - self.local(a)
         return (b - a) + self.laps(self.length / 2 - (b - a)) * self.length
 
-    def visit(self, station: Ball, joined: bool, same: Ball) -> Ball:
+    def visit(self, station: arb, joined: bool, same: arb) -> arb:
         """Take in a row on the path; rows come in the order of the motion.
 
         Args:
@@ -114,7 +114,7 @@ class Drawing:
         self.farthest += ahead + self.behind
         return ahead
 
-    def draw(self, begin: Ball, run: Ball, tips: list[Matrix], bend: Ball) -> None:
+    def draw(self, begin: arb, run: arb, tips: list[arb_mat], bend: arb) -> None:
         """Take in an interval with both rows on the path, or a part of one.
 
         Args:
@@ -135,7 +135,7 @@ class Drawing:
             worst = worst.max(norm(tips[0] + (tips[1] - tips[0]) * part - corner))
         self.deviation = self.deviation.max(worst + bend)
 
-    def _corners(self, low: Ball, high: Ball) -> list[tuple[Ball, Matrix]]:
+    def _corners(self, low: arb, high: arb) -> list[tuple[arb, arb_mat]]:
         """The corners between two stations."""
         found = []
         for lap in range(self.laps(low), self.laps(high) + 1):
@@ -146,7 +146,7 @@ class Drawing:
                 found.append((self.stations[k] + shift, self.corners[k]))
         return found
 
-    def coverage(self) -> Ball:
+    def coverage(self) -> arb:
         """Share of the path in the union of the stretches; never above the true one."""
         parts = []
         for low, high in self.stretches:

@@ -13,7 +13,7 @@ import numpy as np
 from flint import arb, arb_mat
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
-from vdsm_pin.certificate_checker.balls import SLACK, Ball, belongs, claim
+from vdsm_pin.certificate_checker.balls import SLACK, belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import (
     Branch,
@@ -68,7 +68,7 @@ def numbers(words: str) -> list[float]:
     return [*map(float, words.split())]
 
 
-def placed(element: ET.Element) -> list[list[Ball]]:
+def placed(element: ET.Element) -> list[list[Any]]:
     """T_parent_element."""
     origin = element.find("origin")
     words = {} if origin is None else origin.attrib

@@ -5,19 +5,9 @@ from functools import reduce
 from typing import Any, Final
 
 import numpy as np
-from flint import arb
+from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import (
-    MM,
-    SLACK,
-    Ball,
-    Matrix,
-    claim,
-    column,
-    cross,
-    dot,
-    norm,
-)
+from vdsm_pin.certificate_checker.balls import MM, SLACK, angle, claim, column, norm
 from vdsm_pin.certificate_checker.motion import (
     Interval,
     Slices,
@@ -87,7 +77,7 @@ class Rows:
         claim(always([x0], on_rail), "x0 is {} mm", MM * max(x0, key=abs))
         most, link = arm.max_joint_angle + SLACK, arb(arm.max_link_angle + SLACK).cos()
 
-        def in_cone(a: Ball, b: Ball) -> Ball:  # convex within the box alone
+        def in_cone(a: arb, b: arb) -> bool:  # convex within the box alone
             return abs(a).max(abs(b)) <= most and a.cos() * b.cos() >= link
 
         for i in range(1, len(columns), 2):
@@ -111,10 +101,10 @@ class Rows:
         if self.drawing is not None:
             self._draw(self.drawing, rows, motion, tips)
 
-    def _tip(self, motion: Interval, time: float) -> Matrix:
+    def _tip(self, motion: Interval, time: float) -> arb_mat:
         return point_of(motion.pose(time)[self.link], self.last, 0, 0)
 
-    def _end(self, name: str, end: Posture | None, row: int, tip: Matrix) -> None:
+    def _end(self, name: str, end: Posture | None, row: int, tip: arb_mat) -> None:
         """Check a row at the start or goal: its tip, and joints that are stated."""
         if end is None:
             return
@@ -154,7 +144,7 @@ class Rows:
             drawing.draw(begin, run / parts, tips[k : k + 2], bend / (8 * parts**2))
 
     def _look(
-        self, drawing: Drawing, motion: Interval, way: tuple[Ball, Ball], times: Any
+        self, drawing: Drawing, motion: Interval, way: tuple[arb, arb], times: Any
     ) -> None:
         """Check that the last link looks into its cone all through a slice.
 
@@ -172,9 +162,9 @@ class Rows:
             h = times[1] - times[0]
             moves = Slices(motion.tree, [(motion, *times)])
             turning, total = moves.moves(0, self.link, self.last)
-            speed, off = drawing.steepest * abs(run), 0.0
+            speed, off = drawing.steepest * abs(run), arb(0)
             if drawing.target is not None:
-                speed, off = total[0].item(), moved
+                speed, off = arb(total[0].item()), moved
             ends = [self._seen(drawing, motion, t, begin + run * t) for t in times]
             angle, away = (sum(both) / 2 for both in zip(*ends, strict=True))
             nearest = away - speed * h / 2
@@ -189,7 +179,7 @@ class Rows:
             middle = (times[0] + times[1]) / 2
             slices += [(times[0], middle), (middle, times[1])]
 
-    def _astray(self, motion: Interval) -> tuple[Ball, Ball]:
+    def _astray(self, motion: Interval) -> tuple[arb, arb]:
         """What errors turn the last link by, and move the tip.
 
         Errors a and b of a joint's two axes, at right angles, turn what follows by t
@@ -207,12 +197,12 @@ class Rows:
         return turned, moved
 
     def _seen(
-        self, drawing: Drawing, motion: Interval, time: float, station: Ball
-    ) -> tuple[Ball, Ball]:
+        self, drawing: Drawing, motion: Interval, time: float, station: arb
+    ) -> tuple[arb, arb]:
         """Angle of the last link to where it shall look, and how far away that is."""
         axis = column(*motion.pose(time)[self.link].entries()[::4][:3])
         aim = drawing.aim(station, self._tip(motion, time))
-        return arb.atan2(norm(cross(axis, aim)), dot(axis, aim)), norm(aim)
+        return angle(axis, aim), norm(aim)
 
     def _drawn(self, drawing: Drawing) -> None:
         """Check how much of the path is drawn, how well, and that it is drawn once."""
@@ -227,5 +217,5 @@ class Rows:
         claim(enough, "coverage is {}, required is {}", drawn, path.required_coverage)
 
 
-def _deg(angle: Ball) -> float:
+def _deg(angle: arb) -> float:
     return float(np.rad2deg(float(angle)))

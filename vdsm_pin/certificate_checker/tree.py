@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import UP, Ball, Matrix, column, norm, unit
+from vdsm_pin.certificate_checker.balls import UP, column, norm, unit
 
-Pose: TypeAlias = list[Matrix]  # T_world_frame of every frame
+Pose: TypeAlias = list[arb_mat]  # T_world_frame of every frame
 
 FIXED, TURNS, SLIDES = "FIXED", "REVOLUTE", "PRISMATIC"
 
@@ -45,7 +45,7 @@ class Joint:
         self.placement = arb_mat([[*row] for row in placement])
         self.lever = float(norm(point_of(self.placement, 0, 0, 0))) * UP
         x, y, z = unit(column(*map(float, axis))).entries()
-        twist = [[0, 0, 0, x], [0, 0, 0, y], [0, 0, 0, z], [0] * 4]
+        twist: Any = [[0, 0, 0, x], [0, 0, 0, y], [0, 0, 0, z], [0] * 4]
         if kind == TURNS:
             twist = [[0, -z, y, 0], [z, 0, -x, 0], [-y, x, 0, 0], [0] * 4]
         self.first = self.placement * arb_mat(twist)
@@ -60,7 +60,7 @@ class Joint:
         self.turn_error = value if self.kind == TURNS else 0.0
         self.slip = moved + (value if self.kind == SLIDES else 0.0)
 
-    def carries(self, q: Sequence[Ball]) -> Matrix:
+    def carries(self, q: Sequence[arb]) -> arb_mat:
         """T_parent_frame at a row of q: by the exponential of its twist."""
         value = self.offset
         if self.column is not None:
@@ -84,7 +84,7 @@ class Joint:
         )
 
 
-def point_of(frame: Matrix, x: Ball, y: Ball, z: Ball) -> Matrix:
+def point_of(frame: arb_mat, x: Any, y: Any, z: Any) -> arb_mat:
     """Where a point of a frame stands."""
     return column(*(frame * arb_mat(4, 1, [x, y, z, 1])).entries()[:3])
 
@@ -115,7 +115,7 @@ class Tree:
         self.joints = joints
         self._ways: dict[tuple[int, int], list[tuple[int, bool]]] = {}
 
-    def pose(self, q: Sequence[Ball]) -> Pose:
+    def pose(self, q: Sequence[arb]) -> Pose:
         """All frames at a row of q."""
         frames = [arb_mat(4, 4, 1)]
         for joint in self.joints:
