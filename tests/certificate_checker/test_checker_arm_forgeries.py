@@ -18,7 +18,7 @@ from oracles.arm_certificates import ERRORS, HELPER, MATE, OBSTACLES, MadeArm
 from oracles.certificate_cases import write_cube
 from oracles.certificate_mutations import numbers_in, place
 
-from vdsm_pin.certificate_checker.solids import Mesh
+from vdsm_pin.certificate_checker.solids import Solid
 
 TURNED = {
     "obstacles": [
@@ -110,10 +110,10 @@ def test_points_are_outside_farther_than_gaps_by_what_is_thinnest(
     made, asked = MadeArm(tmp_path, obstacles=[shell]), []
     lines = made.certified()
 
-    def check_outside(_: Mesh, __: Any, points: Any) -> None:
+    def check_outside(_: Solid, __: Any, points: Any) -> None:
         asked.extend([off for _, _, off in points])
 
-    monkeypatch.setattr(Mesh, "check_outside", check_outside)
+    monkeypatch.setattr(Solid, "check_outside", check_outside)
     assert made.check(lines).accepted
     assert asked == [0.012, 0.005, 0.005, 0.005]  # tool, camera, valve in two parts
 

@@ -39,7 +39,7 @@ def test_a_plane_proves_what_the_formula_of_the_docs_says() -> None:
         body = Body(2, Solid("ball", [[[0.5, 0.0, 0.0]]], radius=radius))
         points = np.array([0.0, 2.0, 0.0]) + rng.uniform(-0.5, 0.5, (3, 4, 3))
         rest = Solid("rest", points, origin=[4.0, 0.0, 0.0], radius=grown)
-        pair, long = Pair(body, rest, 0, 0.0, lost), rng.uniform(0.1, 9.0)
+        pair, long = Pair(body, Body(0, rest, lost), 0.0), rng.uniform(0.1, 9.0)
         first, last = sorted(rng.choice(4, 2, replace=False))
         n = np.array([rng.uniform(-0.3, 0.3), 1.0, rng.uniform(-0.3, 0.3)])
         plane = Plane("", slices_of(interval), first, last, tuple(long * n), 0.0)
@@ -64,9 +64,7 @@ def test_a_direction_that_is_none_is_refused(length: float) -> None:
     interval = Interval(tree, controls([0, 0]))
     pair = Pair(
         Body(1, Solid("a", [[[0.0, 0.0, 0.0]]])),
-        Solid("b", [[[0, 1.0, 0]]]),
-        0,
-        0.0,
+        Body(0, Solid("b", [[[0, 1.0, 0]]])),
         0.0,
     )
     planes = [
@@ -84,7 +82,7 @@ def test_a_half_space_has_one_direction(axis: int, off: float, good: bool) -> No
     interval = Interval(tree, controls([0, 0]))
     floor = Solid("floor", [[[0.0, 0.0, -2.0]]])
     floor.normal = np.array([0.48, 0.6, 0.64])
-    pair = Pair(Body(1, Solid("a", [[[9.0, 0.0, 0.0]]])), floor, 0, 0.0, 0.0)
+    pair = Pair(Body(1, Solid("a", [[[9.0, 0.0, 0.0]]])), Body(0, floor), 0.0)
     exact = -floor.normal
     n = exact.copy()
     n[axis] += off
@@ -175,7 +173,7 @@ def test_as_much_as_is_proved_may_be_claimed_to_the_last_bit(
 def test_pieces_are_tiled(ranges: list[tuple[int, int]], reason: str) -> None:
     interval = Interval(Tree([]), [])
     rest = Solid("rest", np.zeros((12, 3, 3)))
-    pair = Pair(Body(0, Solid("body", [[[0.0, 0.0, 0.0]]])), rest, 0, 0.0, 0.0)
+    pair = Pair(Body(0, Solid("body", [[[0.0, 0.0, 0.0]]])), Body(0, rest), 0.0)
     proof = [[0.0, 1.0, [[*both, 0, 0, 1, 0.5] for both in ranges]]]
     if reason:
         with pytest.raises(Rejected, match=reason):
@@ -201,7 +199,7 @@ def test_pieces_are_tiled(ranges: list[tuple[int, int]], reason: str) -> None:
 )
 def test_slices_are_tiled(ends: list[tuple[float, float]], reason: str) -> None:
     interval, rest = Interval(Tree([]), []), Solid("rest", np.zeros((1, 1, 3)))
-    pair = Pair(Body(0, Solid("body", [[[0.0, 0.0, 0.0]]])), rest, 0, 0.0, 0.0)
+    pair = Pair(Body(0, Solid("body", [[[0.0, 0.0, 0.0]]])), Body(0, rest), 0.0)
     proof = [[*both, [[0, 1, 0, 0, 1, 0.5]]] for both in ends]
     if reason:
         with pytest.raises(Rejected, match=reason):
@@ -222,7 +220,7 @@ def test_pairs_of_planes_for_single_pieces_are_told() -> None:
         [[[whole]], [[whole], [first, second]], [[first, second]]]
     ):
         body = Body(1, Solid(f"ball {k}", [[[0.0, 0.0, 0.0]]], radius=0.1))
-        pairs.append(Pair(body, wall, 0, 0.0, 0.0))
+        pairs.append(Pair(body, Body(0, wall), 0.0))
         ends = np.linspace(0.0, 1.0, len(slices) + 1).tolist()
         proofs.append([
             [*both, [[*of, 1, 0, 0, 0.5] for of in planes]]
@@ -256,7 +254,7 @@ def test_planes_are_settled_before_more_wait_than_are_looked_at_at_once(
     monkeypatch.setattr(claims, "AT_ONCE", at_once)
     tree = Tree([Joint(0, SLIDES, (0, 0, 1), np.eye(4), (0, 1.0, 0.0))])
     rest = Solid("b", [[[0.0, 3.0, 0.0]]])
-    pair = Pair(Body(1, Solid("a", [[[0.0, 0.0, 0.0]]])), rest, 0, 0.0, 0.0)
+    pair = Pair(Body(1, Solid("a", [[[0.0, 0.0, 0.0]]])), Body(0, rest), 0.0)
     read = []
 
     def lines(wrong: int) -> Iterator[dict[str, Any]]:

@@ -21,6 +21,7 @@ from oracles.robot_certificates import BASES, CELL, VIRTUAL, Made, cell, text
 
 from vdsm_pin.certificate_checker.balls import SLACK, Rejected
 from vdsm_pin.certificate_checker.robot import Model, Robot, within
+from vdsm_pin.certificate_checker.solids import Body
 from vdsm_pin.certificate_checker.tree import Tree
 from vdsm_pin.cli import main
 from vdsm_pin.problem.error_boxes import ErrorBox, JointError
@@ -336,7 +337,7 @@ def test_link_pairs_left_out_are_counted(tmp_path: Path) -> None:
     told: Any = {}
     robot: Any = Robot.__new__(Robot)
     robot.model, robot.tree, robot.notes = model, model.tree, []
-    robot.links = {x.name: (x.frame, x(told)) for x in model.links()}
+    robot.links = {x.name: Body(x.frame, x(told)) for x in model.links()}
     robot.scene = SimpleNamespace(obstacles=[])
     robot.rests = []
     stated = {"joints_rad": {"jb": 0.0, "jc": 0.0}, "joints_m": {}}

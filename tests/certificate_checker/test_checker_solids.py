@@ -8,7 +8,6 @@ import pytest
 
 from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.certificate_checker.balls import Rejected
-from vdsm_pin.certificate_checker.solids import Mesh as MeshSolid
 from vdsm_pin.certificate_checker.solids import (
     Solid,
     away,
@@ -16,7 +15,9 @@ from vdsm_pin.certificate_checker.solids import (
     cover,
     hulls,
     sizes,
-    solid,
+)
+from vdsm_pin.certificate_checker.solids import (
+    solid as as_read,
 )
 from vdsm_pin.geometry.solids import Mesh, PointCloud, Sphere
 
@@ -62,10 +63,10 @@ def test_pieces_of_a_prism_are_no_more_corners_than_its_triangles() -> None:
 
 def test_a_prism_on_a_link_is_covered_by_the_pieces_of_its_section() -> None:
     """Each is the prism over one polygon; the whole one keeps its name."""
-    (whole,) = prism().parts(None)
+    (whole,) = prism().convex(None)
     assert whole.name == "bar"
     np.testing.assert_array_equal(whole.points, prism().points)
-    found, square = prism().parts([[0, 1, 2], [0, 2, 3]]), np.array(SQUARE)
+    found, square = prism().convex([[0, 1, 2], [0, 2, 3]]), np.array(SQUARE)
     for k, (part, corners) in enumerate(
         zip(found, ([0, 1, 2], [0, 2, 3]), strict=True)
     ):
@@ -80,7 +81,7 @@ def test_a_cloud_is_a_ball_about_each_of_its_points() -> None:
     rng = np.random.default_rng(3)
     points = rng.normal(size=(7, 3))
     n = points[2] / np.linalg.norm(points[2])
-    cloud = solid(PointCloud("scan", points, 0.25))
+    cloud = as_read(PointCloud("scan", points, 0.25))
     for first, last in ((0, 7), (2, 3), (4, 6)):
         least = min(float(point @ n) for point in points[first:last]) - 0.25
         assert cloud.support(n, first, last) == pytest.approx(least, rel=0, abs=1e-15)
@@ -187,16 +188,16 @@ def test_a_mesh_on_a_link_is_covered_by_hulls_of_its_triangles(solid: bool) -> N
     """With a point in common where the inside is meant too."""
     tips = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     order = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    mesh = MeshSolid(Mesh("part", tips, order, solid=solid))
-    (whole,) = mesh.parts(None)
+    mesh = as_read(Mesh("part", tips, order, solid=solid))
+    (whole,) = mesh.convex(None)
     expected = np.unique([*tips, *[tips.mean(axis=0)] * solid], axis=0)
     assert whole.name == "part"
     np.testing.assert_array_equal(whole.points[0], expected)
-    first, second = mesh.parts([[0, 1], [2, 3]])
+    first, second = mesh.convex([[0, 1], [2, 3]])
     assert (first.name, second.name) == ("part part 1", "part part 2")
     assert len(first.points[0]) == len(second.points[0]) == 4 + solid
     with pytest.raises(Rejected, match="pieces of part do not make up the whole"):
-        mesh.parts([[0, 1], [2]])
+        mesh.convex([[0, 1], [2]])
 
 
 @pytest.mark.parametrize(

@@ -59,8 +59,8 @@ class Core:
         self.path = Path(Branch(motion.knots, None, inner))
         self.tree, (one, other) = tree_of(query, box), query.bodies
         body = Body(one.frame, solid_of(one.name, one.pieces[0]))
-        rests = solid_of(other.name, other.pieces[0])
-        self.pair = Pair(body, rests, other.frame, required, 0.0)
+        rests = Body(other.frame, solid_of(other.name, other.pieces[0]))
+        self.pair = Pair(body, rests, required)
 
     def check(self, proofs: list[Any]) -> None:
         """Check the proofs of all intervals."""

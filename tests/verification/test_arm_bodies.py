@@ -322,7 +322,7 @@ def test_hulls_of_a_mesh_hold_its_inside(
     mesh = solids.Mesh("part", corners.reshape(-1, 3), faces, solid)
     body = LinkBody(2, mesh, parts)
     groups = [group.tolist() for group in triangle_groups(body)]
-    checked = checker_solid(mesh).parts(groups)
+    checked = checker_solid(mesh).convex(groups)
     inside = np.concatenate(
         [low + rng.uniform(0.0, 1.0, (400, 3)) * (high - low) for low, high in pairs]
     )

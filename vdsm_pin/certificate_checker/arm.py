@@ -5,7 +5,7 @@ that carry obstacles.
 """
 
 from collections.abc import Iterator, Mapping, Set
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path as File
 from typing import Any
 
@@ -16,7 +16,7 @@ from vdsm_pin.certificate_checker.balls import belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import Branch, Path, beside
 from vdsm_pin.certificate_checker.rows import Rows
-from vdsm_pin.certificate_checker.solids import Body, Mesh, Pair, Solid, cover, solid
+from vdsm_pin.certificate_checker.solids import Body, Pair, Solid, cover, solid
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree, frame_of
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
@@ -35,7 +35,7 @@ def arm_joints(lengths: list[float], angles: list[float], base: Any) -> list[Joi
     return joints
 
 
-def own_bodies(arm: Any) -> Iterator[Body]:
+def along_axis(arm: Any) -> Iterator[Body]:
     """The links, the tool that is mounted on the last one, and the feed."""
     ends, tool, radii = arm.link_lengths.tolist(), arm.tool, arm.radii
     last, tip = len(ends), ends[-1]
@@ -74,19 +74,20 @@ class Arm:
         rows = read_trajectory(trajectory, self.arm, joined, bool(problem.tip_path))
         self.lengths = self.arm.link_lengths.tolist()
         self.solids = [solid(x, header["links"]) for x in problem.scene.obstacles]
-        self.meshes = {s.name: s for s in self.solids if isinstance(s, Mesh)}
         stated, least = header["errors"], {"joints_rad": self._asked()}
-        self.grown = grown(stated, problem.errors, least, self.solids)
+        lost = grown(stated, problem.errors, least, self.solids)
         joints = arm_joints(self.lengths, stated["joints_rad"], stated["base"])
         rates = [x for x in (rows.rates, rows.changes) if x is not None]
         own = Branch(rows.joints, rows.times, rates=rates)
         self.own = Tree(joints), Path(own)
-        self.tree, self.path, self.frames = beside(own, joints, problem.scene.obstacles)
+        self.tree, self.path, frames = beside(own, joints, problem.scene.obstacles)
+        every = zip(frames, self.solids, lost, strict=True)
+        self.obstacles = [Body(*one) for one in every]
         self._cover(header)
         self.pairs = [*self._pairs()]
         self.rows = Rows(self, rows)
         self.notes = solids.sizes([*problem.scene.obstacles, *self.arm.bodies])
-        self.notes += [note for mesh in self.meshes.values() for note in mesh.notes()]
+        self.notes += [note for one in self.solids for note in one.notes()]
         self.notes += [f"{a} and {b} left out" for a, b in self.arm.ignore_pairs]
         self.notes.append(f"{joined} pieces join the rows")
 
@@ -99,25 +100,25 @@ class Arm:
 
     def _cover(self, header: Any) -> None:
         """Take the bodies, and the pieces that cover them and the obstacles."""
-        self.bodies, pieces = [*own_bodies(self.arm)], {**header["pieces"]}
+        self.axis, pieces = [*along_axis(self.arm)], {**header["pieces"]}
+        self.bodies = [*self.axis]
         for carried in self.arm.bodies:
-            parts = solid(carried.solid).parts(pieces.pop(carried.solid.name, None))
+            parts = solid(carried.solid).convex(pieces.pop(carried.solid.name, None))
             frame = frame_of(carried.link)
-            self.bodies += [Body(frame, part, own=False) for part in parts]
+            self.bodies += [Body(frame, part) for part in parts]
         cover(self.solids, {**header, "pieces": pieces})
 
     def _pairs(self) -> Iterator[Pair]:
         """What the problem holds apart, in order."""
         required = self.problem.required_clearance
-        for one, rest, off in zip(self.solids, self.frames, self.grown, strict=True):
-            for body in self.bodies:
-                if not self._ignored(body.solid.name, one.name):
-                    yield Pair(body, one, rest, required, off)
+        for obstacle, body in product(self.obstacles, self.bodies):
+            if not self._ignored(body.solid.name, obstacle.solid.name):
+                yield Pair(body, obstacle, required)
         required = self.problem.required_self_clearance
         for both in combinations(self.bodies, 2):
             near, far = sorted(both, key=lambda body: body.frame)
             if self._parts(near, far):
-                yield Pair(far, near.solid, near.frame, required, 0.0)
+                yield Pair(far, near, required)
 
     def _ignored(self, one: str, other: str) -> bool:
         """Whether the problem leaves two names, or parts of what they name, out."""
@@ -130,7 +131,7 @@ class Arm:
 
     def _parts(self, near: Body, far: Body) -> bool:
         """Whether a body can part from one nearer to the base and has to."""
-        if far.frame == near.frame + 2 and near.own and far.own:
+        if far.frame == near.frame + 2 and {near, far} <= {*self.axis}:
             length = [0.0, *self.lengths][near.frame // 2]
             start, end = far.solid.points[0, 0, 0], near.solid.points[0, 1, 0]
             if (length - end) + start <= near.solid.radius + far.solid.radius:
@@ -148,13 +149,12 @@ class Arm:
             first: The pose as the motion begins.
             by_pieces: The pairs that planes for single pieces hold apart.
         """
-        own = [body for body in self.bodies if body.own]
-        thinnest = min(body.solid.radius for body in own)
-        for mesh in self.meshes.values():
-            held = [pair for pair in self.pairs if pair.solid is mesh]
+        axis, thinnest = {*self.axis}, min(body.solid.radius for body in self.axis)
+        for obstacle in self.obstacles:
+            held = [pair for pair in self.pairs if pair.partner == obstacle]
             pairs, points = [pair for pair in held if pair in by_pieces], []
-            if {*own} <= {p.body for p in held} and any(p.body.own for p in pairs):
+            if axis <= {x.body for x in held} and axis & {x.body for x in pairs}:
                 points = [(first[1], (0, 0, 0), thinnest)]
-                pairs = [pair for pair in pairs if not pair.body.own]
+                pairs = [pair for pair in pairs if pair.body not in axis]
             points += [pair.inner(first) for pair in pairs]
-            mesh.check_outside(first[self.frames[self.solids.index(mesh)]], points)
+            obstacle.solid.check_outside(first[obstacle.frame], points)

@@ -7,6 +7,7 @@ where they are certain: rounding can reject a certificate and never accept one.
 from math import isfinite
 from typing import Any, Final
 
+import numpy as np
 from flint import arb, arb_mat
 
 MM: Final = 1000  # messages tell lengths in millimetres
@@ -48,6 +49,11 @@ def belongs(header: Any, keys: str, problem: str, trajectory: str) -> None:
 def column(x: Any, y: Any, z: Any) -> arb_mat:
     """A vector of balls or doubles."""
     return arb_mat(3, 1, [x, y, z])
+
+
+def doubles(a: arb_mat) -> Any:
+    """The entries of a vector in doubles."""
+    return np.array([*map(float, a.entries())])
 
 
 def dot(a: arb_mat, b: arb_mat) -> arb:

@@ -65,7 +65,9 @@ class Clearances:
             for pair, proof in zip(self.pairs, line["proofs"], strict=True):
                 self.place = f"interval {k}, {' and '.join(pair.names)}"
                 planes = [*tiled(pair, proof, self.place, motion)]
-                if any(x.last - x.first < len(pair.solid.points) for x in planes):
+                if any(
+                    x.last - x.first < len(pair.partner.solid.points) for x in planes
+                ):
                     by_pieces.add(pair)
                 self.waiting[pair] += planes
                 self.n_claims += len(planes)
@@ -100,7 +102,7 @@ def tiled(pair: Pair, proof: Any, place: str, motion: Interval) -> Iterator[Plan
     Raises:
         Rejected: If they are not.
     """
-    time, size = 0.0, len(pair.solid.points)
+    time, size = 0.0, len(pair.partner.solid.points)
     for start, stop, planes in proof:
         claim(start == time < stop, f"the slices do not tile at {time}")
         slice_, reached = (motion, time, float(stop)), 0
@@ -121,7 +123,8 @@ def clearances(pair: Pair, planes: Sequence[Plane], slices: Slices) -> Any:
 
     Doubles are off by 2^-53 a step, and no height takes more steps than are counted.
     """
-    n, solid = np.array([plane.n for plane in planes]), pair.solid
+    n, body = np.array([plane.n for plane in planes]), pair.body
+    rest, solid, off = pair.partner
     lengths = np.linalg.norm(n, axis=1)[:, None]
     claim(((lengths > 1e-100) & (lengths < 1e100)).all(), "a direction has no length")
     n /= lengths
@@ -130,10 +133,9 @@ def clearances(pair: Pair, planes: Sequence[Plane], slices: Slices) -> Any:
         claim(near, "n is not the half-space's -normal")
         n[:] = -solid.normal
     at = [slices.numbers[plane.slice] for plane in planes]
-    reached, size = slices.reach(pair.body, pair.rest, at, n)
+    reached, size = slices.reach(body, rest, at, n)
     begins = [solid.support(d, x.first, x.last) for d, x in zip(n, planes, strict=True)]
-    slip = slices.tree.slip(pair.rest, pair.body.frame)
-    lost = pair.body.solid.radius + pair.lost + slip
+    lost = body.solid.radius + off + slices.tree.slip(rest, body.frame)
     steps = 64 + 8 * len(slices.tree.joints)
     rounding = steps * 2.0**-53 * (size + solid.extent + lost)
     return np.array(begins) - reached - lost - rounding

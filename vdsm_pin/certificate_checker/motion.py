@@ -300,13 +300,11 @@ class Slices:
         offset = origins[:, :, body.frame] - origins[:, :, rest]
         seen = np.einsum("stij,sti->stj", mine, n)
         heights = seen @ points + (n * offset).sum(axis=2)[:, :, None]
-        if solid.disc_radius > 0.0:
-            away = np.linalg.norm(np.cross(seen, solid.disc_axis), axis=2)
-            heights += solid.disc_radius * away[:, :, None]
+        heights += np.linalg.norm(seen @ solid.across, axis=2)[:, :, None]
         turning, total = self.moves(rest, body.frame, solid.levers, at)
         (_, bend, tilting, drift, first, second), h = total, self.widths[at, None]
         more = (bend + tilting) * h * h / 8.0 + h * drift / 2.0
-        more += second + solid.disc_radius * turning[3]
+        more += second + solid.disc[1] * turning[3]
         more += self._strayed(body, rest, at, n)
         size = np.abs(origins).max() + solid.extent + (more + first).max(axis=1)
         return (heights.max(axis=1) + more).max(axis=1), size

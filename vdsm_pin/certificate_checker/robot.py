@@ -27,7 +27,6 @@ from vdsm_pin.certificate_checker.solids import (
     CUBE,
     Body,
     Compound,
-    Mesh,
     Pair,
     Solid,
     cover,
@@ -309,7 +308,7 @@ class Robot:
         wrong = f"interpolation is {header['interpolation']}, the file's is {joined}"
         claim(header["interpolation"] == joined, wrong)
         self.own, self.timed = Path(own), own.timed and len(own.knots) > 1
-        self.links = {x.name: (x.frame, x(told)) for x in model.links()}
+        self.links = {x.name: Body(x.frame, x(told)) for x in model.links()}
         things = [solid(one, told) for one in self.scene.obstacles]
         cover(things, header, self.links)
         self.tree, self.path, self.rests = beside(
@@ -324,26 +323,25 @@ class Robot:
         off = grown(stated, asked, self.model.least_errors(asked), things)
         self.model.err(stated)
         required, own = file.required
-        every = zip(things, self.rests, off, strict=True)
-        for (thing, at, lost), (frame, link) in product(every, links.values()):
-            for each in link.parts:
-                yield Pair(Body(frame, each), thing, at, required, lost)
+        obstacles = zip(self.rests, things, off, strict=True)
+        for obstacle, link in product(obstacles, links.values()):
+            for part in link.solid.parts:
+                yield Pair(Body(link.frame, part), Body(*obstacle), required)
         left = self.model.srdf.disabled() if self.model.srdf else {}
         pairs = [*combinations(links, 2)]
         apart = [names for names in pairs if self._held(*names, left)]
         for one, other in apart:
-            both = (links[other], links[one])
-            (frame, link), (at, rest) = sorted(both, key=lambda x: len(x[1].parts))
-            for each in link.parts:
-                yield Pair(Body(frame, each), rest, at, own, 0.0)
+            both = links[other], links[one]
+            link, rest = sorted(both, key=lambda x: len(x.solid.parts))
+            for part in link.solid.parts:
+                yield Pair(Body(link.frame, part), rest, own)
         self.notes += [f"{len(pairs) - len(apart)} of {len(pairs)} link pairs left out"]
-        for mesh in (one for one in things if isinstance(one, Mesh)):
-            self.notes += mesh.notes()
+        self.notes += [note for one in things for note in one.notes()]
         self.notes += sizes(self.scene.obstacles)
 
     def _held(self, one: str, other: str, left: Any) -> bool:
         """Whether two links are held apart."""
-        way = self.tree.way(self.links[one][0], self.links[other][0])
+        way = self.tree.way(self.links[one].frame, self.links[other].frame)
         moving = sum(self.tree.joints[k].column is not None for k, _ in way)
         near = moving == 1 and self.model.srdf is None
         return moving > 0 and not near and frozenset((one, other)) not in left
@@ -358,9 +356,9 @@ class Robot:
         Raises:
             Rejected: If one does not; `place` says where.
         """
-        for pair in self.pairs:
-            if isinstance(pair.solid, Mesh) and pair in by_pieces:
-                pair.solid.check_outside(first[pair.rest], [pair.inner(first)])
+        for pair in (x for x in self.pairs if x in by_pieces):
+            rest, thing, _ = pair.partner
+            thing.check_outside(first[rest], [pair.inner(first)])
         for k in range(self.own.size):
             self.place, ends = f"interval {k}", self.own.times[k : k + 2].tolist()
             step = arb(ends[-1]) - arb(ends[0])

@@ -6,12 +6,13 @@ ball or a disc. Of a half-space the point that its plane goes through is enough.
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.certificate_checker.balls import UP, claim, column, dot, unit
+from vdsm_pin.certificate_checker.balls import UP, claim, column, dot, doubles, unit
 from vdsm_pin.certificate_checker.inside import Surface
 from vdsm_pin.certificate_checker.tree import point_of
 from vdsm_pin.geometry import solids
@@ -21,6 +22,7 @@ MAX_PARTS: Final = 256  # hulls of a mesh at most
 CUBE: Final = np.array([*product((-1.0, 1.0), repeat=3)])
 
 
+@dataclass(eq=False)
 class Solid:
     """An obstacle, or what rides on a frame, in its coordinates.
 
@@ -30,51 +32,55 @@ class Solid:
         origin: What the points were computed from, shape (3,); [m].
         radius: Of the ball that grows the pieces; [m].
         disc: Of a cylinder, axis and radius of the discs that do; [m].
+        normal: Of a half-space.
+        ends: Of a prism, its corners at both, shape (2, c, 3); [m].
+        surface: Of a mesh.
     """
 
-    def __init__(
-        self,
-        name: str,
-        points: Any,
-        origin: Any = 0.0,
-        radius: float = 0.0,
-        disc: tuple[Any, float] = ((0.0, 0.0, 1.0), 0.0),
-    ) -> None:
-        self.name, self.points, self.radius = name, np.array(points, float), radius
-        self.disc_axis, self.disc_radius = np.array(disc[0]), disc[1]
-        self.normal: Any = None  # of a half-space
-        self.ends: Any = None  # of a prism: its corners at both, shape (2, c, 3)
-        far = np.abs(self.points).max() + np.abs(origin).max()
-        self.extent = float(far + self.radius + self.disc_radius)
-        self.levers = UP * (np.linalg.norm(self.points[0], axis=1) + self.disc_radius)
+    name: str
+    points: Any
+    origin: Any = 0.0
+    radius: float = 0.0
+    disc: tuple[Any, float] = ((0.0, 0.0, 1.0), 0.0)
+    normal: Any = None
+    ends: Any = None
+    surface: Any = None
+
+    def __post_init__(self) -> None:
+        """Work out what all of it has in common."""
+        self.points, (axis, grown) = np.array(self.points, float), self.disc
+        self.across = grown * np.cross(axis, np.eye(3))  # n to grown axis x n
+        far = np.abs(self.points).max() + np.abs(self.origin).max()
+        self.extent = float(far + self.radius + grown)
+        self.levers = UP * (np.linalg.norm(self.points[0], axis=1) + grown)
 
     def support(self, n: Any, first: int, last: int) -> float:
         """Least n.x over the pieces first..last-1, for a unit n."""
         least = (self.points[first:last].reshape(-1, 3) @ n).min() - self.radius
-        if self.disc_radius > 0.0:
-            least -= self.disc_radius * np.linalg.norm(np.cross(self.disc_axis, n))
+        if self.disc[1] > 0.0:
+            least -= np.linalg.norm(n @ self.across)
         return float(least)
 
     def size(self) -> float:
         """Largest distance from the middle of the box around the corners, at most."""
         if self.normal is not None:
             return np.inf
-        return away(self.points.reshape(-1, 3), self.radius + self.disc_radius)
+        return away(self.points.reshape(-1, 3), self.radius + self.disc[1])
 
-    def parts(self, pieces: Any) -> "list[Solid]":
+    def convex(self, pieces: Any) -> "list[Solid]":
         """The solids of one piece that a body on a link is covered by.
 
         Args:
             pieces: As for `cut`; of a mesh the triangles under each hull. None where
                 the whole is one piece.
         """
-        if isinstance(self, Mesh):
-            parts = hulls(self.name, self.points, pieces, not self.surface_only)
+        if self.surface:
+            parts = hulls(self.name, self.points, pieces, not self.surface.only)
         else:
             if pieces is not None:
                 self.cut(pieces)
             parts = [*self.points]
-        more = self.extent, self.radius, (self.disc_axis, self.disc_radius)
+        more = self.extent, self.radius, self.disc
         return named_parts([Solid(self.name, [part], *more) for part in parts])
 
     def cut(self, pieces: list[Any]) -> None:
@@ -94,6 +100,28 @@ class Solid:
         claim(boundary(pieces) == boundary([corners]), parts)
         self.points = np.concatenate(self.ends[:, np.array(pieces, dtype=int)], axis=1)
 
+    def check_outside(
+        self, rest: Any, points: Iterable[tuple[Any, Any, float]]
+    ) -> None:
+        """Check that points are not inside of it, where it is a mesh.
+
+        Args:
+            rest: How its frame stands.
+            points: Of each how its frame stands, the point there, and how far from the
+                triangles it stays.
+        """
+        for frame, at, off in points if self.surface else ():
+            seen = doubles(point_of(rest.inv() * frame, *at))
+            why = self.surface.not_outside(seen, off)
+            claim(not why, f"a body is not proved outside {self.name}: {why}")
+
+    def notes(self) -> list[str]:
+        """What was assumed of a mesh."""
+        only, gap = (x.only, x.gap) if (x := self.surface) else (False, 0.0)
+        told = [f"{self.name} is a surface only"] if only else []
+        joined = f"gaps of {self.name}, up to {1e3 * gap:.2g} mm wide, are joined"
+        return [*told, joined] if gap > 0.0 else told
+
 
 def cover(things: Sequence[Any], header: Any, own: Iterable[str] = ()) -> None:
     """Take the pieces that obstacles are counted in, and the corners that close meshes.
@@ -110,7 +138,7 @@ def cover(things: Sequence[Any], header: Any, own: Iterable[str] = ()) -> None:
         named[name].cut(order)
     for name, (corners, seams) in header["joined"].items():
         mesh: Any = named.get(name)
-        claim(isinstance(mesh, Mesh), f"{name} is no mesh: nothing is joined")
+        claim(mesh and mesh.surface, f"{name} is no mesh: nothing is joined")
         mesh.surface.join(corners, seams)
 
 
@@ -163,7 +191,7 @@ def named_parts(parts: "list[Solid]") -> "list[Solid]":
     return parts
 
 
-class Compound:
+class Compound(Solid):
     """Solids of one piece each, at rest on one frame, as planes count them.
 
     Args:
@@ -179,7 +207,7 @@ class Compound:
         claim(good, f"pieces of {name} do not make up the whole")
         self.name, self.parts = name, named_parts(parts)
         self.points: list[Solid] = [parts[k] for k in [*order] or every]
-        self.normal, self.extent = None, max(one.extent for one in parts)
+        self.extent = max(one.extent for one in parts)
 
     def support(self, n: Any, first: int, last: int) -> float:
         """Least n.x over the pieces first..last-1, for a unit n."""
@@ -188,37 +216,7 @@ class Compound:
     def size(self) -> float:
         """As of a solid."""
         points = np.concatenate([one.points[0] for one in self.points])
-        return away(points, max(one.radius + one.disc_radius for one in self.points))
-
-
-class Mesh(Solid):
-    """Triangles; of a surface only the problem says that it has no inside."""
-
-    def __init__(self, mesh: solids.Mesh) -> None:
-        super().__init__(mesh.name, mesh.vertices[mesh.triangles])
-        self.surface, self.surface_only = Surface(self.points), mesh.solid is False
-
-    def check_outside(
-        self, rest: Any, points: Iterable[tuple[Any, Any, float]]
-    ) -> None:
-        """Check that points are not inside.
-
-        Args:
-            rest: How its frame stands.
-            points: Of each how its frame stands, the point there, and how far from the
-                triangles it stays.
-        """
-        for frame, at, off in () if self.surface_only else points:
-            seen = point_of(rest.inv() * frame, *at)
-            why = self.surface.not_outside([*map(float, seen.entries())], off)
-            claim(not why, f"a body is not proved outside {self.name}: {why}")
-
-    def notes(self) -> list[str]:
-        """What was assumed of it."""
-        gap = 1e3 * self.surface.gap
-        told = [f"{self.name} is a surface only"] if self.surface_only else []
-        joined = f"gaps of {self.name}, up to {gap:.2g} mm wide, are joined"
-        return [*told, joined] if gap > 0.0 else told
+        return away(points, max(one.radius + one.disc[1] for one in self.points))
 
 
 def sizes(things: Iterable[Any]) -> list[str]:
@@ -235,12 +233,12 @@ def solid(obstacle: Any, told: Any = None) -> Any:
         obstacle: As it was read.
         told: The certificate's links, of which those of other robots are made.
     """
-    if isinstance(obstacle, scene.Moving):
-        obstacle = obstacle.solid
     if callable(obstacle):
         return obstacle(told)
     name = obstacle.name
     match obstacle:
+        case scene.Moving():
+            return solid(obstacle.solid, told)
         case solids.Sphere():
             return Solid(name, [[obstacle.centre]], radius=obstacle.radius)
         case solids.Capsule() | solids.Cylinder():
@@ -248,63 +246,57 @@ def solid(obstacle: Any, told: Any = None) -> Any:
             ends, radius = [[centre - half, centre + half]], obstacle.radius
             if isinstance(obstacle, solids.Capsule):
                 return Solid(name, ends, radius=radius)
-            axis = unit(column(*obstacle.axis.tolist())).entries()
-            return Solid(name, ends, disc=([*map(float, axis)], radius))
+            axis = doubles(unit(column(*obstacle.axis.tolist())))
+            return Solid(name, ends, disc=(axis, radius))
         case solids.Box(centre=at) | solids.Voxels(centres=at):
             corners = CUBE * obstacle.half_size @ obstacle.rotation.T
             return Solid(name, np.atleast_2d(at)[:, None] + corners, at)
         case solids.Prism():
             flat = [[[*uv, s] for uv in obstacle.polygon] for s in obstacle.span]
             both = obstacle.origin + np.array(flat) @ obstacle.rotation.T
-            found = Solid(name, both.reshape(1, -1, 3), obstacle.origin)
-            found.ends = both
-            return found
+            return Solid(name, both.reshape(1, -1, 3), obstacle.origin, ends=both)
         case solids.PointCloud():
             return Solid(name, obstacle.points[:, None], radius=obstacle.radius)
         case solids.Mesh():
-            return Mesh(obstacle)
+            corners = obstacle.vertices[obstacle.triangles]
+            surface = Surface(corners, obstacle.solid is False)
+            return Solid(name, corners, surface=surface)
     normal = unit(column(*obstacle.normal.tolist()))
     foot = normal * dot(normal, column(*obstacle.point.tolist()))
-    found = Solid(name, [[[*map(float, foot.entries())]]])
-    found.normal = np.array([*map(float, normal.entries())])
-    return found
+    return Solid(name, [[doubles(foot)]], normal=doubles(normal))
 
 
 class Body(NamedTuple):
-    """A convex solid that rides on a frame of the tree.
+    """A solid that rides on a frame of the tree.
 
     Args:
         frame: The frame.
-        solid: Of one piece, in its coordinates.
-        own: Whether it is a link, the tool or the feed: a capsule about the arm's axis.
+        solid: In its coordinates; what moves as seen from another is of one piece.
+        lost: How far its surface may be off; [m].
     """
 
     frame: int
-    solid: Solid
-    own: bool = True
+    solid: Any
+    lost: float = 0.0
 
 
 class Pair(NamedTuple):
-    """A body and a solid that rests in another frame.
+    """A body and another one, in whose frame it is seen.
 
     Args:
-        body: What moves as seen from there.
-        solid: Of any number of pieces.
-        rest: The frame.
+        body: What moves.
+        partner: What rests.
         required: Least clearance; [m].
-        lost: How far the surface of the solid may be off; [m].
     """
 
     body: Body
-    solid: Solid | Compound
-    rest: int
+    partner: Body
     required: float
-    lost: float
 
     @property
     def names(self) -> list[str]:
         """As the header has them."""
-        return [self.body.solid.name, self.solid.name]
+        return [self.body.solid.name, self.partner.solid.name]
 
     def inner(self, pose: Any) -> tuple[Any, Any, float]:
         """The body's frame, its middle there, and how far off the other it stays."""
