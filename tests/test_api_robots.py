@@ -205,10 +205,10 @@ def test_values_of_another_kind_are_refused_in_a_sentence(
         "expected RobotFiles, as of": lambda: vp.cell_of("one.urdf"),  # type: ignore[arg-type]
         "text or Path; found NoneType": lambda: vp.RobotFiles(None),  # type: ignore[arg-type]
         "text or Path; found int": lambda: vp.RobotFiles(files.urdf, srdf=3),  # type: ignore[arg-type]
-        "interpolation is of a snake arm's": lambda: vp.read_trajectory(
+        "interpolation is 'septic', expected one of": lambda: vp.read_trajectory(
             "a.csv",
             cell,
-            "linear",  # type: ignore[call-overload]
+            "septic",  # type: ignore[call-overload]
         ),
     }
     for expected, call in refused.items():

@@ -167,9 +167,6 @@ def _subject(
         from vdsm_pin.robots.cell import Cell
 
         expect(problem, Cell, "read_cell(path); or a Problem, as of read_problem(path)")
-        if options.interpolation != "auto":
-            message = "interpolation is of a snake arm's rows; a robot's have their own"
-            raise InvalidInput(message)
     if errors is not None:
         problem = problem.under(expect(errors, Box, "ErrorBox(base_mm=1.0)"))
     return subject_of(problem, options)
@@ -347,9 +344,7 @@ def write_certificate(
     from vdsm_pin.io.source import check_unchanged, readable, sha256_of_file
     from vdsm_pin.report.folder import check_kept
 
-    joined: Interpolation = "auto"
-    if isinstance(result, ArmVerification):
-        joined = result.trajectory.interpolation
+    joined = result.trajectory.interpolation
     subject = _judged(result, MotionOptions(interpolation=joined, topic=topic))
     source = result.problem.source
     if source is None or not source.is_whole:
@@ -386,7 +381,11 @@ def read_trajectory(
 
 @overload
 def read_trajectory(
-    path: str | Path, problem: "Cell", *, topic: str | None = None
+    path: str | Path,
+    problem: "Cell",
+    interpolation: Interpolation = "auto",
+    *,
+    topic: str | None = None,
 ) -> JointTrajectory: ...
 
 
@@ -402,9 +401,8 @@ def read_trajectory(
     Args:
         path: The file.
         problem: Whose arm or robot moves.
-        interpolation: What joins the rows of an arm's: straight lines, cubic pieces by
-            the file's velocities, quintic ones by its accelerations too, or what it has
-            columns for.
+        interpolation: What joins the rows: straight lines, cubic pieces by the file's
+            velocities, quintic ones by its accelerations too, or whichever it has.
         topic: Of a robot's motion, in a bag.
 
     Returns:

@@ -415,7 +415,7 @@ def lines_of(what: str, lines: list[Any]) -> None:
         case "an interval less":
             lines.pop()
         case "another interpolation":
-            header["interpolation"] = "linear"
+            header["interpolation"] = "septic"
         case "errors":
             header["errors"] = {"joints_rad": []}
         case "more clearance":

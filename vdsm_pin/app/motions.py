@@ -26,7 +26,7 @@ class MotionOptions:
 
     Args:
         deadline: What is not judged by then is undecided.
-        interpolation: What joins the rows of an arm's trajectory file.
+        interpolation: What joins the rows of the file.
         topic: Topic of a bag that holds the motion of another robot; None for the
             only one.
     """

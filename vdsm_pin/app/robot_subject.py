@@ -39,8 +39,9 @@ class RobotSubject:
 
     def read(self, file: Path) -> JointTrajectory:
         """Read the motion of a file."""
-        robot = self.problem.robot
-        motion = read_motion(file, robot.joints, self.options.topic, robot.values)
+        robot, how = self.problem.robot, self.options
+        given = robot.joints, how.topic, robot.values, how.interpolation
+        motion = read_motion(file, *given)
         joint_path(file, motion)
         check_times(file, self.problem.scene, motion)
         return motion

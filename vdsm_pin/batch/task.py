@@ -8,6 +8,7 @@ from typing import Final
 from vdsm_pin.app.workflow import JUDGED, PLANNED
 from vdsm_pin.errors import VdsmError
 from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.io.trajectory_file import Interpolation
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.run_record import versions
@@ -48,7 +49,9 @@ class TaskSettings:
         keep: Which problems keep their files: "all", "failed" (all that did not pass)
             or "none".
         errors: Every clearance is asked for under these and the problem's own errors.
-        words: Options of the command line that state `errors`, to repeat the run.
+        words: Options of the command line that state `errors` and `interpolation`, to
+            repeat the run.
+        interpolation: What joins the rows of given motions.
         certificate: Whether each certified motion gets its certificate.
         pdf: Whether each report is printed too.
         resume: Whether a finished and intact folder may stay.
@@ -59,6 +62,7 @@ class TaskSettings:
     keep: str = ALL
     errors: ErrorBox = field(default_factory=ErrorBox)
     words: tuple[str, ...] = ()
+    interpolation: Interpolation = "auto"
     certificate: bool = False
     pdf: bool = False
     resume: bool = False

@@ -139,7 +139,7 @@ def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
         task.command,
         certificate=task.staging / CERTIFICATE if asked.certificate else None,
         pdf=task.staging / PDF if asked.pdf else None,
-        options=MotionOptions(deadline),
+        options=MotionOptions(deadline, asked.interpolation),
         index=INDEX,
     )
     verified = verify_to_folder(order)

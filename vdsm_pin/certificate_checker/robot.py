@@ -198,9 +198,9 @@ class Model:
         claim(found, f"mesh {name!r} is not found")
         return found
 
-    def branch(self, trajectory: File, topic: str | None = None) -> Branch:
+    def branch(self, trajectory: File, topic: str | None, how: Any = "auto") -> Branch:
         """How a trajectory moves the joints."""
-        motion = read_motion(trajectory, self.moved, topic, self.values)
+        motion = read_motion(trajectory, self.moved, topic, self.values, how)
         timed = motion.times is not None
         rates = [x for x in (motion.rates, motion.changes) if timed and x is not None]
         branch = Branch(motion.q, motion.times, rates=rates)
@@ -303,10 +303,10 @@ class Robot:
         found = file.scene(size, names, other_robot)
         self.scene, source = found.scene, file.source(model.more, found).sha256
         belongs(header, "errors topic", source, sha256_of_file(trajectory))
-        own, told = model.branch(trajectory, header["topic"]), header["links"]
+        how, told = header["interpolation"], header["links"]
+        own = model.branch(trajectory, header["topic"], how)
         joined = {1: "linear", 3: "cubic", 5: "quintic"}[own.degree]
-        wrong = f"interpolation is {header['interpolation']}, the file's is {joined}"
-        claim(header["interpolation"] == joined, wrong)
+        claim(how == joined, f"interpolation is {how}, the file's is {joined}")
         self.own, self.timed = Path(own), own.timed and len(own.knots) > 1
         self.links = {x.name: Body(x.frame, x(told)) for x in model.links()}
         things = [solid(one, told) for one in self.scene.obstacles]

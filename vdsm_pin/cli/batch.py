@@ -7,6 +7,7 @@ import typer
 
 from vdsm_pin.cli import options
 from vdsm_pin.cli.ending import INTERRUPTED, fail
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import COLD_PLAN_LIMIT
 
@@ -37,6 +38,7 @@ def batch(
             "problem, nothing is planned; robots of a URDF need it.",
         ),
     ] = None,
+    interpolation: options.Interpolation = "auto",
     jobs: Annotated[int, options.option("NUMBER", "Processes.", min=1)] = 1,
     resume: Annotated[
         bool,
@@ -77,6 +79,11 @@ def batch(
     words = errors.words()
     if slide_error_mm != "0":
         words += ("--slide-error-mm", slide_error_mm)
+    if interpolation != "auto":
+        words += ("--interpolation", interpolation)
+        if not trajectories:
+            message = "--interpolation has no meaning without --trajectories"
+            raise InvalidInput(message)
     if time_limit is None:  # machines of a cluster may have no machine code yet
         time_limit = COLD_PLAN_LIMIT if scheduler else default_limit()
     settings = TaskSettings(
@@ -84,6 +91,7 @@ def batch(
         keep=keep,
         errors=errors.box(slide_error_mm),
         words=words,
+        interpolation=interpolation,
         certificate=certificate,
         pdf=pdf,
         resume=resume,

@@ -6,7 +6,16 @@ from functools import wraps
 from inspect import Parameter, Signature, signature
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, NoReturn, TypeAlias
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Final,
+    Literal,
+    NamedTuple,
+    NoReturn,
+    TypeAlias,
+)
 
 import typer
 from typer.core import TyperCommand
@@ -89,6 +98,14 @@ PlanningTime = Annotated[
         f"{PLAN_LIMIT:g}, and {COLD_PLAN_LIMIT:g} for the first plan here (it "
         "compiles) and on a cluster.",
         min=0.001,
+    ),
+]
+Interpolation = Annotated[
+    Literal["auto", "linear", "cubic", "quintic"],
+    option(
+        None,
+        "What joins waypoints: straight lines, or smooth pieces by the velocities "
+        "(cubic) and accelerations (quintic) of the trajectory.",
     ),
 ]
 TimeLimit = Annotated[

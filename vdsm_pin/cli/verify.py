@@ -2,7 +2,7 @@
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from vdsm_pin.robots.cell import Cell
 
 commands = options.Family()
-
-Interpolation = Literal["auto", "linear", "cubic", "quintic"]
 
 
 @commands.add(
@@ -53,14 +51,7 @@ def verify(
             "--all-pairs", help="List every pair at every interval in clearance.csv."
         ),
     ] = False,
-    interpolation: Annotated[
-        Interpolation,
-        options.option(
-            None,
-            "What joins waypoints: straight lines, or smooth pieces by the "
-            "velocities (cubic) and accelerations (quintic) of the trajectory.",
-        ),
-    ] = "auto",
+    interpolation: options.Interpolation = "auto",
     answer: options.Answer,
     robot: RobotOptions,
     topic: Topic = None,
@@ -74,7 +65,6 @@ def verify(
     of_arm: dict[str, object] = {
         "--pdf": pdf,
         "--all-pairs": all_pairs,
-        "--interpolation": interpolation != "auto",
     }
     deadline = Deadline.after(time_limit)
     box = errors.box(slide_error_mm)

@@ -58,20 +58,21 @@ def check_topic(file: Path, topic: str | None) -> None:
         raise InvalidFile(file=file, fault=fault)
 
 
-def read_bag(file: Path, topic: str | None = None) -> JointTrajectory:
+def read_bag(file: Path, topic: str | None = None, most: int = 2) -> JointTrajectory:
     """The trajectory in a bag.
 
     Args:
         file: A ROS 1 bag, an MCAP or db3 file, or the folder of a ROS 2 bag.
         topic: Where it is, `NAME`, or `NAME#K` for its message K, from 0. None where
             there is only one.
+        most: Derivatives that are read, as of `of_message`.
 
     Raises:
         InvalidFile: If it is not there, not the only one or damaged.
     """
     with naming_file(file):
         data = _read(file, topic)
-    return of_message(Place.of(file, data))
+    return of_message(Place.of(file, data), most)
 
 
 def _read(file: Path, topic: str | None) -> Any:

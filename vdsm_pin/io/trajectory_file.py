@@ -88,6 +88,12 @@ Interpolation: TypeAlias = Literal["auto", "linear", "cubic", "quintic"]
 """What joins the rows: straight lines; cubic pieces, by their velocities; quintic ones,
 by their accelerations too; or whichever the file has columns for."""
 
+
+def orders(interpolation: Interpolation) -> int:
+    """How many derivatives are read at most: velocities, accelerations."""
+    return {"linear": 0, "cubic": 1}.get(interpolation, 2)
+
+
 TIME: Final = "time_s"
 X0: Final = "x0_m"
 _JOINT: Final = re.compile(r"(alpha|theta)[0-9]+_rad")
@@ -225,7 +231,7 @@ def _smooth_columns(
         wanted: Names of velocities and of accelerations.
         interpolation: What joins the rows.
     """
-    most = {"linear": 0, "cubic": 1}.get(interpolation, 2)
+    most = orders(interpolation)
     read = [names for names in wanted[:most] if set(names) & set(found)]
     if interpolation != "auto":
         read = list(wanted[:most])

@@ -19,28 +19,30 @@ ENDINGS: Final = (".yaml", ".yml", ".json")
 MAX_BYTES: Final = 256 << 20
 MULTI: Final = "multi_dof_joint_trajectory"
 _FREE: Final = ("x", "y", "z", "yaw", "pitch", "roll")
+_DERIVATIVES: Final = "velocities", "accelerations"
 _NANO: Final = 1e-9
 _TIMES: Final = ("sec", "nanosec"), ("secs", "nsecs")
 """Keys of a duration in ROS 2, and in ROS 1."""
 
 
-def read_joint_trajectory(file: Path) -> JointTrajectory:
-    """A trajectory of a text file.
+def read_joint_trajectory(file: Path, most: int = 2) -> JointTrajectory:
+    """A trajectory of a text file, with as many derivatives as `of_message` reads.
 
     Raises:
         InvalidFile: If it is none or breaks its contract.
     """
     document = read_yaml(read_text(file, limit=MAX_BYTES), file=file)
-    return of_message(Place(document, (), document.data))
+    return of_message(Place(document, (), document.data), most)
 
 
-def of_message(data: Place) -> JointTrajectory:
+def of_message(data: Place, most: int = 2) -> JointTrajectory:
     """A JointTrajectory, by itself or in a RobotTrajectory or a message about one.
 
     A joint of several degrees has the columns NAME/x, /y, /z, /yaw, /pitch, /roll.
 
     Args:
         data: Mappings, lists and numbers.
+        most: Derivatives that are read: none, velocities, or accelerations too.
 
     Raises:
         InvalidFile: If it is no trajectory or breaks its contract.
@@ -48,9 +50,9 @@ def of_message(data: Place) -> JointTrajectory:
     message, multi = _found(data)
     one = other = None
     if message is not None and (message.get("points").value or multi is None):
-        one = _single(message)
+        one = _single(message, most)
     if multi is not None:
-        other = _multi(multi)
+        other = _multi(multi, most)
     if one is not None and other is not None and multi is not None:
         with multi.naming():
             return _together(one, other)
@@ -94,18 +96,27 @@ def _points(message: Place) -> tuple[tuple[str, ...], list[Place]]:
     return tuple(names.value), found
 
 
-def _single(message: Place) -> JointTrajectory:
+def _single(message: Place, most: int) -> JointTrajectory:
     names, points = _points(message)
     q, rates, changes = (
-        _values(points, key, len(names))
-        for key in ("positions", "velocities", "accelerations")
+        _values(points, key, len(names)) if order <= most else None
+        for order, key in enumerate(("positions", *_DERIVATIVES))
     )
     if q is None:
         fault = "has no positions"
         raise points[0].invalid(fault)
     times = _times(points)
     with message["points"].naming():
-        return JointTrajectory(names, q, times, rates, changes)
+        notes = _unread(points, most)
+        return JointTrajectory(names, q, times, rates, changes, notes)
+
+
+def _unread(points: list[Place], most: int) -> tuple[str, ...]:
+    """A note on derivatives that the points have and that are not read."""
+    left = [
+        key for key in _DERIVATIVES[most:] if any(one.get(key).value for one in points)
+    ]
+    return (f"{' and '.join(left)} are not read",) if left else ()
 
 
 def _values(points: list[Place], key: str, count: int) -> FloatArray | None:
@@ -138,7 +149,7 @@ def _seconds(time: Place) -> float:
     return numbers[0] + _NANO * numbers[1]
 
 
-def _multi(message: Place) -> JointTrajectory:
+def _multi(message: Place, most: int) -> JointTrajectory:
     """Joints of several degrees: their places, and turns about z.
 
     Raises:
@@ -155,7 +166,7 @@ def _multi(message: Place) -> JointTrajectory:
             fault = f"expected one for each of {len(names)} joints"
             raise transforms.invalid(fault)
         rows[k] = [_transform(one) for one in transforms.items()]
-        if point.get("velocities").value:
+        if most and point.get("velocities").value:
             fault = "has velocities of joints of several degrees, expected none"
             raise point.invalid(fault)
     rows[..., 3:] = np.unwrap(rows[..., 3:], axis=0)
@@ -168,7 +179,8 @@ def _multi(message: Place) -> JointTrajectory:
             raise message.invalid(fault)
     rows[..., 4:] = rows[:1, :, 4:]
     whole = tuple(f"{name}/{part}" for name in names for part in _FREE)
-    return JointTrajectory(whole, rows.reshape(len(rows), -1), _times(points))
+    times, notes = _times(points), _unread(points, most)
+    return JointTrajectory(whole, rows.reshape(len(rows), -1), times, notes=notes)
 
 
 def _transform(transform: Place) -> FloatArray:
@@ -213,7 +225,9 @@ def _together(one: JointTrajectory, other: JointTrajectory) -> JointTrajectory:
     elif not np.array_equal(one.times, times):
         message = "has other times than joint_trajectory"
         raise InvalidInput(message)
-    return JointTrajectory(one.names + other.names, np.hstack([one.q, other.q]), times)
+    names, q = one.names + other.names, np.hstack([one.q, other.q])
+    notes = tuple(dict.fromkeys((*one.notes, *other.notes)))
+    return JointTrajectory(names, q, times, notes=notes)
 
 
 def message_of(motion: JointTrajectory) -> dict[str, Any]:

@@ -29,17 +29,24 @@ _SMOOTH: Final = re.compile(r"(.+)_(velocity|acceleration)_(rad|deg|mm|m)_(s|s2)
 
 
 def read_csv(
-    file: File, joints: Sequence[RobotJoint], values: Values
+    file: File, joints: Sequence[RobotJoint], values: Values, most: int = 2
 ) -> JointTrajectory:
-    """The joints that move and, without rates, others that `values` has."""
+    """The joints that move and, without rates, others that `values` has.
+
+    Args:
+        file: The CSV.
+        joints: Those that move.
+        values: Of all joints by those that move.
+        most: Derivatives that are read: none, velocities, or accelerations too.
+    """
     known = {joint.name for joint in joints}
     with readable(file), open_text(file) as text:
         table = Table(file, text, lambda name: _stated([name]).keys() & known)
-        return _read(table, joints, values)
+        return _read(table, joints, values, most)
 
 
 def _read(
-    table: Table, joints: Sequence[RobotJoint], values: Values
+    table: Table, joints: Sequence[RobotJoint], values: Values, most: int
 ) -> JointTrajectory:
     """The same of a table whose header alone was read."""
     file, names, known = table.file, table.names, {joint.name for joint in joints}
@@ -47,7 +54,10 @@ def _read(
     _check_once(file, names, stated)
     columns, factors = _position_columns(file, stated, joints)
     others = [one for one in stated if one in values and one not in known]
-    smooth = [_smooth_columns(file, names, joints, *w) for w in (RATES, CHANGES)]
+    smooth = [
+        _smooth_columns(file, names, joints, *what) if order <= most else []
+        for order, what in enumerate((RATES, CHANGES), start=1)
+    ]
     if smooth[1] and not smooth[0]:
         fault = "has accelerations, expected velocities too"
         raise InvalidFile(file=file, where="line 1", fault=fault)

@@ -11,6 +11,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.bags import check_topic, is_bag, read_bag
 from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.trajectory_file import Interpolation, orders
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.robots.model import RobotJoint, Values
@@ -27,6 +28,7 @@ def read_motion(
     joints: Sequence[RobotJoint],
     topic: str | None = None,
     values: Values | None = None,
+    joined: Interpolation = "auto",
 ) -> JointTrajectory:
     """The waypoints of a trajectory, a column for each joint that moves.
 
@@ -37,22 +39,37 @@ def read_motion(
         topic: Of a bag.
         values: Of all joints by those that move; a column of one that stands still or
             mimics another has to agree with them.
+        joined: What joins the rows.
 
     Raises:
         InvalidFile: If a joint is missing, there twice or elsewhere than it is judged,
-            or a value is no number or in another unit than stated.
+            a value is no number or in another unit than stated, or there is not what
+            such pieces need.
     """
-    values = values or {}
+    values, most = values or {}, orders(joined)
     check_topic(file, topic)
     if is_bag(file):
-        whole = read_bag(file, topic)
+        whole = read_bag(file, topic, most)
     else:
         check_is_file(file)
         if file.suffix.lower() in ENDINGS:
-            whole = read_joint_trajectory(file)
+            whole = read_joint_trajectory(file, most)
         else:
-            whole = read_csv(file, joints, values)
+            whole = read_csv(file, joints, values, most)
+    if joined in ("cubic", "quintic"):
+        _check_smooth(file, whole, most)
     return moved(whole, joints, values, file)
+
+
+def _check_smooth(file: File, motion: JointTrajectory, most: int) -> None:
+    """Refuse a motion without what pieces by this many derivatives need."""
+    needed = {"times": motion.times, "velocities": motion.rates}
+    needed["accelerations"] = motion.changes
+    for name in [*needed][: most + 1]:
+        if needed[name] is None:
+            fault = f"has no {name}, which smooth pieces between waypoints need; "
+            fault += "--interpolation linear judges straight lines"
+            raise InvalidFile(file=file, fault=fault)
 
 
 def moved(
