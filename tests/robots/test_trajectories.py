@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import shutil
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from oracles.shortcuts import read_path
 
 from tests.robots.test_robots import CELL, SCENE, URDF, mutated, write
+from vdsm_pin.app import conversion
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.geometry.arrays import rotation_from_rpy
@@ -32,7 +34,8 @@ from vdsm_pin.robots.trajectory_files import read_motion
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.records import Verdict
 
-FORMATS = [".csv", ".yaml", ".json", ".bag", ".mcap"]
+FORMATS = [".csv", ".yaml", ".json", ".bag", ".mcap", ""]
+"""Endings of files, none of a bag's folder."""
 
 
 @pytest.fixture
@@ -60,10 +63,12 @@ def motion(smooth: int, rows: int = 5) -> JointTrajectory:
 
 def written(folder: Path, ending: str, given: JointTrajectory, robot: Robot) -> Path:
     file = folder / f"plan{ending}"
+    if file.is_dir():
+        shutil.rmtree(file)
     file.unlink(missing_ok=True)
     if ending == ".csv":
         file.write_text(csv_text(given, robot))
-    elif ending in (".bag", ".mcap"):
+    elif ending in (".bag", ".mcap", ""):
         pytest.importorskip("rosbags")
         write_bag(given, file)
     else:
@@ -564,14 +569,22 @@ def test_trajectories_are_converted(
 ) -> None:
     """Of a robot and of the arm, to every format and back to the same numbers."""
     pytest.importorskip("rosbags")
-    formats = [word for f in FORMATS[1:] for word in ("--also", f[1:])]
+    formats = [word for name in conversion.FORMATS for word in ("--also", name)]
     given = motion(1)
     cell = write(tmp_path, "cell.yaml", CELL + SCENE)
     file, out = written(tmp_path, ".csv", given, robot), tmp_path / "out"
     assert run("convert", cell, "--trajectory", file, "--out", out, *formats) == 0
-    for ending in FORMATS:
-        found = read_motion(out / f"trajectory{ending}", robot.joints)
+    robots = "robot_trajectory.yaml", "robot_trajectory.json"
+    names = [*(f"trajectory{ending}" for ending in FORMATS), *robots]
+    for name in names:
+        found = read_motion(out / name, robot.joints)
         np.testing.assert_array_equal(found.q, given.q)
+        np.testing.assert_array_equal(found.rates, given.rates)
+    assert [*json.loads((out / robots[1]).read_text())] == ["joint_trajectory"]
+    again = "convert", cell, "--trajectory", out / "trajectory", "--out", out
+    assert run(*again, "--also", "db3") == 2
+    assert "is an input" in capsys.readouterr().err
+    assert run(*again) == 0
     assert run("convert", cell, "--cables", file, "--out", out) == 2
     problem = read_problem("paper/obs1")
     rng = np.random.default_rng(8)
@@ -581,15 +594,15 @@ def test_trajectories_are_converted(
     write_trajectory(tmp_path / "arm.csv", arm)
     words = ("convert", "paper/obs1", "--trajectory")
     assert run(*words, tmp_path / "arm.csv", "--out", out, *formats) == 0
-    for ending in FORMATS:
+    for name in names:
         back = tmp_path / "back"
-        assert run(*words, out / f"trajectory{ending}", "--out", back) == 0
+        assert run(*words, out / name, "--out", back) == 0
         found = read_trajectory(back / "trajectory.csv", problem.manipulator)
         np.testing.assert_array_equal(found.joints, arm.joints)
-        if ending != ".csv":
-            judge = "verify", "paper/obs1", "--trajectory", out / f"trajectory{ending}"
+        if name != "trajectory.csv":
+            judge = "verify", "paper/obs1", "--trajectory", out / name
             assert run(*judge, "--out", back) == 2
-            assert f"{ending}: is no CSV; `vdsm convert" in capsys.readouterr().err
+            assert f"{name}: is no CSV; `vdsm convert" in capsys.readouterr().err
     bag = out / "trajectory.bag"
     for topic, status in (("/joint_trajectory", 0), ("/other", 2)):
         assert run(*words, bag, "--topic", topic, "--out", back) == status

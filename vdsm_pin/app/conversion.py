@@ -14,6 +14,7 @@ from vdsm_pin.app.workflow import TRAJECTORY
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.bags import check_topic, is_bag, read_bag, write_bag
+from vdsm_pin.io.source import files_in
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory, text_of
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
@@ -26,6 +27,18 @@ from vdsm_pin.robots.trajectory_files import read_motion
 
 CONVERTED: Final = TRAJECTORY, CENTRES, CABLES
 """What a conversion of a snake arm's motion writes to its folder."""
+
+FORMATS: Final = {
+    "yaml": ("trajectory.yaml",),
+    "json": ("trajectory.json",),
+    "robot-yaml": ("robot_trajectory.yaml",),
+    "robot-json": ("robot_trajectory.json",),
+    "mcap": ("trajectory.mcap",),
+    "db3": ("trajectory/trajectory.db3", "trajectory/metadata.yaml"),
+    "bag": ("trajectory.bag",),
+}
+"""Formats of ROS and their files: a JointTrajectory or RobotTrajectory as text, or a
+JointTrajectory in an MCAP file, a ROS 2 bag or a ROS 1 bag."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +101,7 @@ def convert_to_folder(
         problem: For its arm and frame, or its robot.
         given: The file to convert; of any other robot a trajectory.
         folder: Where the files go.
-        also: Formats that the angles are written in too, as a JointTrajectory: yaml,
-            json, mcap (ROS 2) or bag (ROS 1).
+        also: Formats of `FORMATS` that the angles are written in too.
 
     Returns:
         The motion.
@@ -98,8 +110,12 @@ def convert_to_folder(
         InvalidInput: If the file is bad or the folder cannot be written.
     """
     of_arm = isinstance(problem, PlanningProblem)
-    names = *(CONVERTED if of_arm else (TRAJECTORY,)), *map(message_name, also)
-    check_outputs([*problem.files, given.file], folder=folder, names=names)
+    names = CONVERTED if of_arm else (TRAJECTORY,)
+    files = [
+        (folder / file, ()) for one in dict.fromkeys(also) for file in FORMATS[one]
+    ]
+    inputs = *problem.files, *files_in(given.file)
+    check_outputs(inputs, folder=folder, names=names, files=files)
     motion = given.read(problem)
     with staged(folder) as staging:
         subject_of(problem).write(staging / TRAJECTORY, motion)
@@ -111,21 +127,20 @@ def convert_to_folder(
     return motion
 
 
-def message_name(ending: str) -> str:
-    """The file of a format."""
-    return f"trajectory.{ending}"
-
-
 def write_messages(folder: Path, motion: JointTrajectory, also: Sequence[str]) -> None:
     """Write a motion in formats of ROS.
 
     Raises:
         InvalidInput: If rosbags is needed and not installed.
     """
-    for ending in also:
-        file = folder / message_name(ending)
-        if ending in ("yaml", "json"):
-            file.write_text(text_of(motion, f".{ending}"), encoding="utf-8")
+    for one in dict.fromkeys(also):
+        file = folder / FORMATS[one][0]
+        if one == "db3":
+            write_bag(motion, file.parent)
+        elif file.suffix in ENDINGS:
+            of_robot = one.startswith("robot")
+            text = text_of(motion, file.suffix, of_robot=of_robot)
+            file.write_text(text, encoding="utf-8")
         else:
             write_bag(motion, file)
 

@@ -112,11 +112,14 @@ def explain(
 
 
 class Format(StrEnum):
-    """Of a JointTrajectory."""
+    """Of ROS; see `conversion.FORMATS`."""
 
     yaml = "yaml"
     json = "json"
+    robot_yaml = "robot-yaml"
+    robot_json = "robot-json"
     mcap = "mcap"
+    db3 = "db3"
     bag = "bag"
 
 
@@ -140,7 +143,11 @@ def convert(
     ] = None,
     also: Annotated[
         list[Format] | None,
-        options.option(None, "Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
+        options.option(
+            None,
+            "Write a JointTrajectory too, or a RobotTrajectory (robot-); mcap and db3 "
+            "are ROS 2, bag ROS 1.",
+        ),
     ] = None,
     topic: Topic = None,
     *,

@@ -186,13 +186,15 @@ def write_bag(motion: JointTrajectory, file: Path) -> None:
 
     Args:
         motion: What it holds.
-        file: Its ending says what: `.bag` for ROS 1, `.mcap` for ROS 2.
+        file: Its ending says what: `.bag` for ROS 1, `.mcap` for a file of ROS 2, none
+            for the folder of a ROS 2 bag, with metadata.yaml and a .db3.
 
     Raises:
         InvalidInput: If rosbags is not installed.
     """
     if find_spec("rosbags") is None:
-        message = f"{file.suffix} needs rosbags: pip install 'vdsm-pin[bags]'"
+        what = file.suffix or "a ROS 2 bag"
+        message = f"{what} needs rosbags: pip install 'vdsm-pin[bags]'"
         raise InvalidInput(message)
     from rosbags.typesys import Stores, get_typestore
 
@@ -207,10 +209,14 @@ def write_bag(motion: JointTrajectory, file: Path) -> None:
         return
     from rosbags.rosbag2 import StoragePlugin, Writer
 
-    store, folder = get_typestore(Stores.ROS2_HUMBLE), file.with_suffix(".parts")
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as two:
+    store, whole = get_typestore(Stores.ROS2_HUMBLE), not file.suffix
+    kind = StoragePlugin.SQLITE3 if whole else StoragePlugin.MCAP
+    folder = file if whole else file.with_suffix(".parts")
+    with Writer(folder, version=9, storage_plugin=kind) as two:
         connection = two.add_connection(TOPIC, PLANS[0], typestore=store)
         two.write(connection, 0, store.serialize_cdr(_typed(store, motion), PLANS[0]))
+    if whole:
+        return
     (written,) = folder.glob("*.mcap")
     written.write_bytes(_with_checksums(written.read_bytes()))
     written.replace(file)

@@ -251,16 +251,21 @@ def duration(seconds: float) -> dict[str, int]:
     return {"sec": whole, "nanosec": part}
 
 
-def text_of(motion: JointTrajectory, ending: str) -> str:
+def text_of(motion: JointTrajectory, ending: str, *, of_robot: bool = False) -> str:
     """The text of a file: JSON, or YAML with a line for each point.
 
     Args:
         motion: What it holds.
         ending: `.json` or `.yaml`.
+        of_robot: Whether it is a RobotTrajectory, else it is a JointTrajectory.
     """
     message = message_of(motion)
     if ending == ".json":
-        return json.dumps(message, indent=1) + "\n"
+        whole = {"joint_trajectory": message} if of_robot else message
+        return json.dumps(whole, indent=1) + "\n"
     names = json.dumps(message["joint_names"], ensure_ascii=False)
     rows = [f"  - {json.dumps(point)}" for point in message["points"]]
-    return "\n".join([f"joint_names: {names}", "points:", *rows]) + "\n"
+    lines = [f"joint_names: {names}", "points:", *rows]
+    if of_robot:
+        lines = ["joint_trajectory:", *(f"  {line}" for line in lines)]
+    return "\n".join(lines) + "\n"

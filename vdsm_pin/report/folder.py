@@ -11,7 +11,7 @@ from typing import Final
 
 from vdsm_pin.errors import CannotWrite, InvalidFile
 from vdsm_pin.io.atomic import check_replaceable, writing
-from vdsm_pin.io.source import check_ending
+from vdsm_pin.io.source import check_ending, files_in
 
 UNFINISHED: Final = ".vdsm-unfinished-"
 """What the names of temporary folders begin with."""
@@ -116,6 +116,8 @@ def identity(path: Path) -> tuple[int, int] | None:
 def staged(folder: Path, within: Path | None = None) -> Iterator[Path]:
     """A temporary folder whose files move into `folder` when the block succeeds.
 
+    Those of a folder in it move into one of that name.
+
     Files of the same name are replaced, each in one step; other files stay. Two
     processes that fill one folder move their files one after the other, so that these
     never mix. What a killed process left is removed.
@@ -144,9 +146,11 @@ def staged(folder: Path, within: Path | None = None) -> Iterator[Path]:
             try:
                 yield staging
                 with locked(folder):
-                    for path in sorted(staging.iterdir()):
-                        with writing(folder / path.name):  # another user's, perhaps
-                            path.replace(folder / path.name)
+                    for path in files_in(staging):
+                        place = folder / path.relative_to(staging)
+                        with writing(place):  # another user's, perhaps
+                            place.parent.mkdir(exist_ok=True)
+                            path.replace(place)
             except CannotWrite as error:  # of a staged file, whose place says nothing
                 file = Path(error.file)
                 told = folder / file.name if file.parent == staging else file
