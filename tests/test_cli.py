@@ -709,7 +709,7 @@ def test_every_command_has_an_answer_for_programs_and_can_be_silent(
         assert (ran.status, vdsm(*words, "--quiet").out) == (0, ""), name
     assert set(found["new"]["files"]) == {path.name for path in made.iterdir()}
     assert found["diff"] == {"worse": False, "changes": []}
-    assert found["urdf"]["files"] == [str(urdf)]
+    assert found["urdf"]["files"] == [str(urdf), str(urdf.with_suffix(".srdf"))]
     assert found["convert"]["waypoints"] == len(rows.read_text().splitlines()) - 1
     assert Path(found["export"]["file"]).stat().st_size > 1000
     needed = [one for one in found["doctor"]["findings"] if one["needed"]]

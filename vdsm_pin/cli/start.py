@@ -120,10 +120,13 @@ def urdf(
     *,
     answer: options.Answer,
 ) -> None:
-    """Write the URDF of an arm."""
+    """Write the URDF of an arm, and beside it the SRDF.
+
+    The SRDF lists the pairs of links that the arm does not hold apart.
+    """
     from vdsm_pin.app.problems import read_problem
     from vdsm_pin.arm.manipulator import BUILT_IN, built_in
-    from vdsm_pin.arm.urdf_writer import mesh_names, urdf_text
+    from vdsm_pin.arm.urdf_writer import mesh_names, srdf_text, urdf_text
     from vdsm_pin.io.atomic import atomic_path
     from vdsm_pin.io.problem_file import built_in_names
     from vdsm_pin.report.folder import check_outputs
@@ -134,17 +137,18 @@ def urdf(
         built_in(name)  # which says what arms there are
     problem = None if name in BUILT_IN else read_problem(name)
     arm = BUILT_IN[name] if problem is None else problem.manipulator
-    text = urdf_text(arm)
+    texts = {out: urdf_text(arm), out.with_suffix(".srdf"): srdf_text(arm)}
     shapes = {solid.name: solid for _, solid in arm.carried}
     files = {
         out.with_name(file): obj_text(shapes[body])
         for body, file in mesh_names(arm).items()
     }
     read = () if problem is None else problem.files
-    outputs = (out, (".urdf", ".xml")), *((file, ()) for file in files)
+    others = [*[*texts][1:], *files]
+    outputs = (out, (".urdf", ".xml")), *((file, ()) for file in others)
     check_outputs(read, files=outputs)
-    for file, content in {**files, out: text}.items():
+    for file, content in {**files, **texts}.items():
         with atomic_path(file) as path:
             path.write_text(content, encoding="utf-8")
-    made = [str(file) for file in (out, *files)]
+    made = [str(file) for file in (*texts, *files)]
     answer.tell(f"wrote {', '.join(made)}", files=made)
