@@ -61,6 +61,11 @@ class ArmDrawing:
         """Names of the links, in the order of the brackets."""
         return [f"link {i + 1}" for i in range(self.problem.manipulator.n_links)]
 
+    @property
+    def not_drawn(self) -> list[str]:
+        """Nothing: the arm is drawn as it is judged."""
+        return []
+
     def scene(self, obstacles: Sequence[Obstacle]) -> dict[str, Any]:
         """The arm, some obstacles and the desired path; base frame, [m]."""
         problem, arm = self.problem, self.problem.manipulator

@@ -132,6 +132,10 @@ class Drawing(Protocol):
     def names(self) -> list[str]:
         """Names of the links, in the order of the brackets."""
 
+    @property
+    def not_drawn(self) -> list[str]:
+        """What links look like that is not drawn, and why, a sentence each."""
+
     def scene(self, obstacles: Sequence[Obstacle]) -> dict[str, Any]:
         """The arm or robot and some obstacles; base frame, [m]."""
 

@@ -85,6 +85,7 @@ def report_data(verification: Verification) -> dict[str, Any]:
         data: Everything its scripts read, as JSON that is safe inside HTML.
         charts: Identifier, title and note of every plot.
         complete: Whether every row of the motion is shown.
+        not_drawn: What links look like that is not drawn, and why.
         drawn: How many triangles are drawn of each obstacle drawn, by its name.
     """
     lost = verification.counterexamples
@@ -109,6 +110,7 @@ def report_data(verification: Verification) -> dict[str, Any]:
         "data": embedded(page),
         "charts": plots,
         "complete": shown.complete,
+        "not_drawn": drawing.not_drawn,
         "drawn": {solid["name"]: solid["count"] for solid in scene["obstacles"]},
     }
 

@@ -1,16 +1,18 @@
 """What a page shows of a robot of a URDF: its links, its motion, its joints' plots.
 
-Links are drawn as they are judged: a mesh as its convex hull.
+Links are drawn as the URDF says that they look, and as they are judged: a mesh as its
+convex hull.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, quaternions
+from vdsm_pin.geometry.arrays import FloatArray, first_equal, quaternions
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Obstacle
@@ -24,9 +26,10 @@ from vdsm_pin.report.drawing import (
     subdivided,
 )
 from vdsm_pin.report.palette import link_colours
-from vdsm_pin.report.solids import Surface, joined, piece_surface
+from vdsm_pin.report.solids import Surface, coarse, joined, piece_surface
 from vdsm_pin.report.thinning import Thinned, thinned
 from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.visuals import Visual, Visuals, visuals_of
 from vdsm_pin.units import MM_PER_M
 
 _STEP: Final = np.deg2rad(4.0)
@@ -37,6 +40,12 @@ _MOST: Final = 4_000
 
 _SMOOTH: Final = 8
 """Parts of a smooth piece at least."""
+
+LOOK_TRIANGLES: Final = 24_000
+"""Triangles that a page has at most of how all links look: about half a megabyte."""
+
+FEWEST_TRIANGLES: Final = 60
+"""Of one mesh: below, it is no longer recognised."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +71,11 @@ class RobotDrawing:
         """Names of the links, in the order of the brackets."""
         return [body.name for body in self.problem.robot.bodies]
 
+    @property
+    def not_drawn(self) -> list[str]:
+        """What cannot be read of how links look."""
+        return self._visuals.notes
+
     def scene(self, obstacles: Sequence[Obstacle]) -> dict[str, Any]:
         """Some obstacles and the links, each about the middle of its corners."""
         bodies = self.problem.robot.bodies
@@ -75,8 +89,11 @@ class RobotDrawing:
                     "vertices": packed(skin.vertices),
                     "triangles": packed(skin.triangles, "<u4"),
                     "round": skin.round,
+                    "looks": [_told(*look) for look in looks],
                 }
-                for body, skin in zip(bodies, self._skins, strict=True)
+                for body, skin, looks in zip(
+                    bodies, self._skins, self._looks, strict=True
+                )
             ],
         }
 
@@ -127,12 +144,29 @@ class RobotDrawing:
             skins.append(replace(skin, vertices=skin.vertices - middle))
         return skins
 
+    @cached_property
+    def _visuals(self) -> Visuals:
+        return visuals_of(self.problem.robot)
+
+    @cached_property
+    def _looks(self) -> list[list[tuple[Surface, str]]]:
+        """How each link looks besides, about its middle, and in which colours."""
+        links = self._visuals.links
+        shapes = [one.shape for one in chain(*links)]
+        count = sum(len(shape) for shape in shapes if isinstance(shape, np.ndarray))
+        share = min(1.0, LOOK_TRIANGLES / max(1, count))
+        return [
+            [(_look(one, middle, share), one.colour) for one in looks]
+            for looks, middle in zip(links, self._middles, strict=True)
+        ]
+
     def silhouette(self, moment: float) -> Silhouette:
         """Corners of each link at a moment in waypoints."""
-        links = [
-            one.skin.vertices @ one.turns[0].T + one.places[0]
-            for one in self.parts(np.array([moment]))
-        ]
+        places, turns = self._frames(
+            self.trajectory.path.at_moments(np.array([moment]))
+        )
+        each = zip(self._skins, places, turns, strict=True)
+        links = [skin.vertices @ turn[0].T + place[0] for skin, place, turn in each]
         return Silhouette(links, 0.0)
 
     def told_moments(self) -> FloatArray:
@@ -146,9 +180,13 @@ class RobotDrawing:
 
     def parts(self, moments: FloatArray) -> list[DrawnPart]:
         """The links at moments in waypoints."""
-        looks = self.names, self._skins, link_colours(len(self.names))
+        colours, parts = link_colours(len(self.names)), []
         rows = self._frames(self.trajectory.path.at_moments(moments))
-        return [DrawnPart(*one) for one in zip(*looks, *rows, strict=True)]
+        each = zip(self.names, self._skins, self._looks, colours, *rows, strict=True)
+        for name, skin, looks, colour, places, turns in each:
+            for shown, ink in looks or [(skin, colour)]:
+                parts.append(DrawnPart(name, shown, ink, places, turns))
+        return parts
 
     def charts(
         self, shown: Thinned, clearances: list[dict[str, Any]]
@@ -180,6 +218,27 @@ def _moments(motion: JointTrajectory, shown: Thinned) -> FloatArray:
     least = 1 if motion.path.degree == 1 else min(_SMOOTH, most)
     parts = np.ceil(ways / _STEP).clip(least, most).astype(int)
     return subdivided(rows, parts)
+
+
+def _look(visual: Visual, middle: FloatArray, share: float) -> Surface:
+    """How a link looks, about its middle, with a part of its triangles."""
+    if not isinstance(visual.shape, np.ndarray):
+        skin = piece_surface(visual.shape)
+        return replace(skin, vertices=skin.vertices - middle)
+    corners = visual.shape.reshape(-1, 3) - middle
+    first, index = first_equal(corners)
+    most = max(FEWEST_TRIANGLES, int(share * len(visual.shape)))
+    return coarse(corners[first], index.reshape(-1, 3), most)
+
+
+def _told(skin: Surface, colour: str) -> dict[str, Any]:
+    """What a page is told of how a link looks."""
+    return {
+        "vertices": packed(skin.vertices),
+        "triangles": packed(skin.triangles, "<u4"),
+        "round": skin.round,
+        "colour": colour,
+    }
 
 
 def _middle(body: Body) -> FloatArray:

@@ -104,7 +104,7 @@ def surface(
         case HalfSpace():
             return _plane(obstacle, extent)
         case Mesh():
-            return _coarse(obstacle, fine.triangles)
+            return coarse(obstacle.vertices, obstacle.triangles, fine.triangles)
         case PointCloud():
             half = np.full(3, obstacle.radius)
             return _cells(obstacle.points, np.eye(3), half, fine.triangles)
@@ -240,9 +240,14 @@ def _cells(
     return Surface(vertices, triangles)
 
 
-def _coarse(solid: Mesh, most: int) -> Surface:
-    """The mesh, its corners merged on a grid until few enough triangles are left."""
-    vertices, triangles = solid.vertices, solid.triangles
+def coarse(vertices: FloatArray, triangles: IntArray, most: int) -> Surface:
+    """A mesh, its corners merged on a grid until few enough triangles are left.
+
+    Args:
+        vertices: Shape (n, 3); [m].
+        triangles: Vertex indices, shape (m, 3).
+        most: So many.
+    """
     low = vertices.min(axis=0)
     size = float(np.max(vertices.max(axis=0) - low))
     cells = 512

@@ -66,9 +66,32 @@ class LinkReader:
         Raises:
             InvalidFile: If a mesh is missing, far too large or scaled oddly.
         """
-        name = link.get("name", "")
-        collisions = link.findall("collision")
-        return tuple(p for one in collisions for p in self._of(name, one))
+        name, found = link.get("name", ""), list[LinkPiece]()
+        for collision in link.findall("collision"):
+            placement = origin_of(collision)
+            for shape in self._shapes(name, collision, placement):
+                if isinstance(shape, np.ndarray):
+                    found += self._cover(name, shape, placement)
+                else:
+                    found.append(shape)
+        return tuple(found)
+
+    def surfaces(
+        self, link: ET.Element, visual: ET.Element
+    ) -> Iterator[LinkPiece | FloatArray]:
+        """What a visual element of a link shows, in the link's frame.
+
+        Of a mesh the corners of its triangles, shape (n, 3, 3); [m].
+
+        Raises:
+            InvalidFile: If a mesh is missing, far too large or scaled oddly.
+        """
+        placement = origin_of(visual)
+        for shape in self._shapes(link.get("name", ""), visual, placement):
+            if isinstance(shape, np.ndarray):
+                yield placement[:3, 3] + shape @ placement[:3, :3].T
+            else:
+                yield shape
 
     def meshes(self, document: ET.Element) -> tuple[Path, ...]:
         """The mesh files of all links, each once.
@@ -83,10 +106,15 @@ class LinkReader:
         ]
         return tuple(dict.fromkeys(found))
 
-    def _of(self, link: str, collision: ET.Element) -> Iterator[LinkPiece]:
-        placement = origin_of(collision)
+    def _shapes(
+        self, link: str, element: ET.Element, placement: FloatArray
+    ) -> Iterator[LinkPiece | FloatArray]:
+        """The shapes of an element where T_link_shape places them.
+
+        Of a mesh the corners of its triangles, not placed, shape (n, 3, 3); [m].
+        """
         turn, shift = placement[:3, :3], placement[:3, 3]
-        geometry = collision.find("geometry")
+        geometry = element.find("geometry")
         for shape in [] if geometry is None else list(geometry):
             match shape.tag:
                 case "box":
@@ -103,8 +131,7 @@ class LinkReader:
                     ends = np.array([shift - along, shift + along])
                     yield Hull(ends, float(shape.get("radius", "")))
                 case "mesh":
-                    corners = self._triangles(link, shape)
-                    yield from self._cover(link, corners, placement)
+                    yield self._triangles(link, shape)
 
     def _cover(
         self, link: str, corners: FloatArray, placement: FloatArray

@@ -89,6 +89,9 @@ class Robot:
         more_files: What the file of its URDF includes, and its links' meshes.
         covers: By link, of each of its meshes the triangles under each hull, or the
             primitive around it.
+        urdf: Its file, where it was read from one; None where nobody knows how its
+            links look.
+        package_dirs: Where `package://NAME/REST` is looked for.
     """
 
     name: str
@@ -106,6 +109,8 @@ class Robot:
     covers: Mapping[str, Sequence[tuple[IntArray, ...] | Hull]] = field(
         default_factory=dict
     )
+    urdf: Path | None = None
+    package_dirs: tuple[Path, ...] = ()
 
     @property
     def reach(self) -> float:

@@ -67,6 +67,8 @@ def read_robot(files: RobotFiles) -> Robot:
         notes=(*reader.notes, *unknown, *odd, *_not_judged(document)),
         more_files=(*included, *links.meshes(document)),
         covers=links.covers,
+        urdf=urdf,
+        package_dirs=files.package_dirs,
     )
 
 

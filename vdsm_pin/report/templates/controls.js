@@ -103,6 +103,8 @@ function clearancesOf(charts, motion) {
 function bindView(view, title) {
   for (const button of document.querySelectorAll("[data-look]"))
     button.addEventListener("click", () => view.look(button.dataset.look));
+  const looking = (view.scene.links || []).some((link) => (link.looks || []).length);
+  for (const row of document.querySelectorAll("[data-solids]")) row.hidden = !looking;
   for (const box of document.querySelectorAll("[data-toggle]"))
     box.addEventListener("change", () => view.toggle(box.dataset.toggle, box.checked));
   document.querySelector("[data-save]").addEventListener("click", () => {

@@ -47,8 +47,15 @@ class Robot {
       const ink = new LineBasicMaterial({ color: 0x3b4048, transparent: true, opacity: 0.35 });
       if (!solid.round) link.add(new LineSegments(new EdgesGeometry(indexed, CREASE), ink));
       link.name = solid.name;
+      link.looks = (solid.looks || []).map((one) => {
+        const skin = new Mesh(solidShape(one)[0], phong(one.colour, { side: DoubleSide, ...more }));
+        skin.own = one.colour;
+        link.add(skin);
+        return skin;
+      });
       return link;
     });
+    this.showSolids(false);
     for (const link of this.links) this.group.add(link);
   }
 
@@ -62,8 +69,21 @@ class Robot {
 
   // Give some links, counted from 0, another colour.
   mark(links, colour) {
-    this.links.forEach((one, i) =>
-      one.material.color.set(links.includes(i) ? colour : this.colours[i]));
+    this.links.forEach((one, i) => {
+      one.material.color.set(links.includes(i) ? colour : this.colours[i]);
+      for (const skin of one.looks)
+        skin.material.color.set(links.includes(i) ? colour : skin.own);
+    });
+  }
+
+  // Show what was proved around what the links look like, or that alone.
+  showSolids(on) {
+    for (const link of this.links.filter((one) => one.looks.length)) {
+      const glass = { transparent: true, opacity: 0.35, depthWrite: false };
+      link.material.setValues(glass);
+      link.material.visible = on;
+      for (const part of link.children) if (!link.looks.includes(part)) part.visible = on;
+    }
   }
 
   // Corners of the boxes around the links where they stand.

@@ -274,6 +274,7 @@ class ArmView {
     if (what === "swept" && !this.swept) this.root.add((this.swept = sweptVolume(this)));
     if (what === "swept") this.swept.visible = on;
     if (what === "numbers") this.overlay.numbers = on;
+    if (what === "solids") this.arm.showSolids(on);
     this.viewer.set_dirty();
   }
 
