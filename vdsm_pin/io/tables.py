@@ -117,7 +117,9 @@ class Table:
         """What stands there that may be meant."""
         stem, _, unit = name.rpartition("_")
         near = [
-            other for other in self.ignored if stem and other.startswith(f"{stem}_")
+            other
+            for other in self.ignored
+            if stem and (other == stem or other.startswith(f"{stem}_"))
         ]
         if near:
             return f", but {near[0][:40]!r}; expected in {unit}"

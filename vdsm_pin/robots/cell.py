@@ -32,13 +32,20 @@ def check_errors(robot: Robot, scene: Scene, errors: ErrorBox) -> None:
 
     Raises:
         UnknownName: If they name a joint that does not move, or no obstacle.
-        InvalidInput: If they count joints, turn one that slides or the reverse, or turn
-            a half-space.
+        InvalidInput: If they count joints, are of all joints that turn or slide where
+            none does, turn one that slides or the reverse, or turn a half-space.
     """
     if errors.joints:
         message = "joint errors of a robot are one number, or by name: JOINT=DEG"
         raise InvalidInput(message)
     joints = {joint.name: joint for joint in robot.joints}
+    kinds = {joint.turns for joint in robot.joints}
+    plain = ("joint", errors.joint, True), ("slide", errors.slide, False)
+    for what, error, turns in plain:
+        if error and turns not in kinds:
+            way = "turns" if turns else "slides"
+            message = f"a {what} error has no meaning: no joint that moves {way}"
+            raise InvalidInput(message)
     for one in errors.named:
         if one.name not in joints:
             raise UnknownName(kind="moving joint", name=one.name, known=tuple(joints))

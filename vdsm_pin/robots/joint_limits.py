@@ -149,7 +149,7 @@ def read_limits(path: Path) -> dict[str, Limits]:
     """
     document = read_yaml(read_text(path, limit=MAX_BYTES), file=path)
     joints = Place(document, (), document.data)["joint_limits"]
-    return {name: _limits(joints[name]) for name in joints.keys()}
+    return {str(name): _limits(joints[name]) for name in joints.keys()}
 
 
 def _limits(joint: Place) -> Limits:

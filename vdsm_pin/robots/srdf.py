@@ -15,10 +15,15 @@ from vdsm_pin.text import listed
 
 MAX_BYTES: Final = 16 << 20
 
+DISABLE: Final = "disable_collisions"
+ENABLE: Final = "enable_collisions"
+DEFAULT: Final = "disable_default_collisions"
+"""Elements that say which pairs of links are held apart."""
+
 KNOWN: Final = {
     "robot": (
         *("group", "group_state", "end_effector", "virtual_joint", "passive_joint"),
-        *("disable_collisions", "enable_collisions", "disable_default_collisions"),
+        *(DISABLE, ENABLE, DEFAULT),
         *("link_sphere_approximation", "joint_property"),
     ),
     "group": ("group", "link", "joint", "chain"),
@@ -84,21 +89,48 @@ class Srdf:
                 raise self._invalid(fault)
 
     def disabled(self) -> dict[frozenset[str], str]:
-        """Pairs of links that it does not hold apart, with its reason."""
-        found = {}
-        for pair, element in self._disabled():
+        """Pairs of links that it does not hold apart, with its reason.
+
+        As in MoveIt: first all pairs of links that it disables by default, without
+        those that it enables; then, whatever is enabled, those that it disables.
+        """
+        found = dict[frozenset[str], str]()
+        for link in self._by_default():
+            why = f"left out by the SRDF: disable_default_collisions of {link!r}"
+            found |= {frozenset((link, other)): why for other in sorted(self._links)}
+        for pair, _ in self._pairs(ENABLE):
+            found.pop(pair, None)
+        for pair, element in self._pairs(DISABLE):
             reason = element.get("reason", "no reason given")
             found[pair] = f"left out by the SRDF: {reason}"
         return found
 
     def notes(self) -> Iterator[str]:
-        """What it disables of links that there are not: as MoveIt, nothing."""
-        named = set().union(*(pair for pair, _ in self._disabled()))
-        if unknown := sorted(named - self._links):
-            yield f"disable_collisions of the SRDF names no links: {listed(unknown)}"
+        """What of it changes nothing, or else than MoveIt has it."""
+        for tag in (DISABLE, ENABLE, DEFAULT):
+            pairs = [pair for pair, _ in self._pairs(tag)]
+            named = {*self._by_default()} if tag == DEFAULT else set().union(*pairs)
+            if unknown := sorted(named - self._links):
+                yield f"{tag} of the SRDF names no links: {listed(unknown)}"
+        if known := [one for one in self._by_default() if one in self._links]:
+            yield (
+                f"{DEFAULT} of the SRDF leaves pairs of links out; obstacles are held "
+                f"apart from these links all the same: {listed(known)}"
+            )
+        left = {pair for pair, _ in self._pairs(DISABLE)}
+        both = dict.fromkeys(p for p, _ in self._pairs(ENABLE) if p in left)
+        for one in both:
+            names = " and ".join(map(repr, sorted(one)))
+            yield f"the SRDF enables and disables {names}: left out, as in MoveIt"
 
-    def _disabled(self) -> Iterator[tuple[frozenset[str], ET.Element]]:
-        for element in self._root.iter("disable_collisions"):
+    def _by_default(self) -> list[str]:
+        """Links whose pairs it leaves out, unless it enables them."""
+        found = (one.get("link", "") for one in self._root.findall(DEFAULT))
+        return [*dict.fromkeys(found)]
+
+    def _pairs(self, tag: str) -> Iterator[tuple[frozenset[str], ET.Element]]:
+        """Pairs of links that elements of a kind name."""
+        for element in self._root.iter(tag):
             pair = element.get("link1", ""), element.get("link2", "")
             yield frozenset(pair), element
 

@@ -52,10 +52,10 @@ def _read(
     file, names, known = table.file, table.names, {joint.name for joint in joints}
     stated = _stated(names)
     _check_once(file, names, stated)
-    columns, factors = _position_columns(file, stated, joints)
+    columns, factors = _position_columns(table, stated, joints)
     others = [one for one in stated if one in values and one not in known]
     smooth = [
-        _smooth_columns(file, names, joints, *what) if order <= most else []
+        _smooth_columns(table, joints, *what) if order <= most else []
         for order, what in enumerate((RATES, CHANGES), start=1)
     ]
     if smooth[1] and not smooth[0]:
@@ -104,12 +104,13 @@ def _check_once(file: File, names: Sequence[str], stated: Stated) -> None:
 
 
 def _position_columns(
-    file: File, named: Stated, joints: Sequence[RobotJoint]
+    table: Table, named: Stated, joints: Sequence[RobotJoint]
 ) -> tuple[list[str], list[float]]:
     """Names of the columns of the joints, and what makes them SI units."""
-    columns, factors = [], []
+    columns, factors, file = [], list[float](), table.file
     for joint in joints:
         if joint.name not in named:
+            _check_unit(table, joint, joint.name)
             fault = (
                 f"has no column for joint {joint.name!r}, expected "
                 f"{joint.name}_{joint.unit}; or state where it stands: `lock` in the "
@@ -123,6 +124,15 @@ def _position_columns(
     return columns, factors
 
 
+def _check_unit(table: Table, joint: RobotJoint, name: str, per: str = "") -> None:
+    """Refuse a column of a joint that states no unit."""
+    if name in table.names:
+        known = ("rad", "deg") if joint.turns else ("m", "mm")
+        words = " or ".join(f"{name}_{unit}{per}" for unit in known)
+        fault = f"has the column {name!r} without a unit, expected {words}"
+        raise InvalidFile(file=table.file, where="line 1", fault=fault)
+
+
 def _check_kind(file: File, name: str, unit: str, joint: RobotJoint) -> None:
     """Refuse lengths of a joint that turns, and angles of one that slides."""
     if (unit in ("rad", "deg")) != joint.turns:
@@ -132,17 +142,20 @@ def _check_kind(file: File, name: str, unit: str, joint: RobotJoint) -> None:
 
 
 def _smooth_columns(
-    file: File, names: Sequence[str], joints: Sequence[RobotJoint], what: str, per: str
+    table: Table, joints: Sequence[RobotJoint], what: str, per: str
 ) -> list[str]:
     """Names of the velocities or accelerations of all joints, or none at all."""
-    found: Stated = {}
-    for name in names:
+    file, found = table.file, Stated()
+    for name in table.names:
         m = _SMOOTH.fullmatch(name)
         if m and (m[2], m[4]) == (what, per):
             if m[1] in found:
                 fault = f"has {name!r} and {found[m[1]][0]!r}, expected one of them"
                 raise InvalidFile(file=file, where="line 1", fault=fault)
             found[m[1]] = name, m[3]
+    for joint in joints:
+        if joint.name not in found:
+            _check_unit(table, joint, f"{joint.name}_{what}", f"_{per}")
     mine = [joint for joint in joints if joint.name in found]
     for joint in joints if mine else []:
         if joint.name not in found:

@@ -12,7 +12,7 @@ from vdsm_pin.io.source import naming_file
 from vdsm_pin.proof.bodies import Body, LeftOut
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.joint_limits import read_limits
+from vdsm_pin.robots.joint_limits import Limits, read_limits
 from vdsm_pin.robots.joints import JointReader, Moving
 from vdsm_pin.robots.link_solids import LinkReader
 from vdsm_pin.robots.model import Robot, reach_of
@@ -49,7 +49,7 @@ def read_robot(files: RobotFiles) -> Robot:
     bodies = _bodies(links, document, reader)
     tree = Tree(tuple(reader.joints))
     disabled = more.disabled() if more is not None else {}
-    unknown = more.notes() if more is not None else ()
+    unknown = (*_unlimited(limits, document), *(more.notes() if more else ()))
     apart = any(joint.placement[:3, 3].any() for joint in tree.joints)
     odd = (*links.notes, *(links.too_large(reach_of(tree)) if apart else ()))
     held, left_out = held_pairs(tree, bodies, disabled, more is None)
@@ -70,6 +70,13 @@ def read_robot(files: RobotFiles) -> Robot:
         urdf=urdf,
         package_dirs=files.package_dirs,
     )
+
+
+def _unlimited(limits: Mapping[str, Limits], document: ET.Element) -> Iterator[str]:
+    """A note on limits of joints that there are not."""
+    names = {joint.get("name", "") for joint in document.findall("joint")}
+    if unknown := [name for name in limits if name not in names]:
+        yield f"limits of what is no joint of the URDF are not read: {listed(unknown)}"
 
 
 def _not_judged(document: ET.Element) -> Iterator[str]:
