@@ -28,11 +28,8 @@ def grown(
         least[off.name] = [max(shift, off.shift), max(turn, off.turn)]
     base = [asked.base, asked.base_turn]
     reject_less(stated, {**joints, "base": base, "obstacles": least})
-    found = []
-    for one in solids:
-        shift, turn = stated["obstacles"][one.name]
-        found.append(shift + (turn * one.size() if turn > 0.0 else 0.0))
-    return found
+    each = [(one, *stated["obstacles"][one.name]) for one in solids]
+    return [shift + (turn * one.size() if turn else 0.0) for one, shift, turn in each]
 
 
 def reject_less(stated: Any, asked: Any) -> None:

@@ -56,6 +56,11 @@ def always(columns: Sequence[Points], good: Any, halvings: int = 20) -> bool:
     return all(always(each, good, halvings - 1) for each in parts)
 
 
+def keeps(points: Points, low: Any, high: Any) -> bool:
+    """Whether a column of q stays within limits all along."""
+    return always([points], lambda q: low <= q <= high)
+
+
 def raised(points: Points, degree: int) -> Points:
     """Control points of a higher degree, of the same polynomial."""
     while (n := len(points)) <= degree:
@@ -113,8 +118,6 @@ class Branch:
         k, last = int(np.searchsorted(self.times, start, "right")) - 1, len(self.knots)
         if not 0 <= k < last - 1:
             return [row(self.knots[min(max(k, 0), last - 1)])] * 2
-        if (start, end) == (self.times[k], self.times[k + 1]):
-            return self.controls(k)
         own, step = arb(self.times[k]), arb(self.times[k + 1]) - arb(self.times[k])
         return part(self.controls(k), (start - own) / step, (end - own) / step)
 
@@ -211,8 +214,7 @@ class Interval:
         """Of a slice bounds of q, of its rates and of how fast those change."""
         points, bounds = self.controls, []
         for _ in range(3):
-            cut = (low, high) != (0.0, 1.0)
-            here = part(points, arb(low), arb(high)) if cut else points
+            here = part(points, arb(low), arb(high))
             columns = (map(abs, column) for column in columns_of(here))
             bounds.append([UP * float(reduce(arb.max, column)) for column in columns])
             points = derivative(points)
@@ -255,15 +257,15 @@ class Slices:
             if steps := self.tree.way(rest, frame):
                 number, up = steps[-1]
                 joint, value = self.tree.joints[number], self.bounds[number]
-                before = self.sweep(rest, number + 1 if up else joint.parent)
-                turning, total = (x.copy() for x in before)
-                turning[2:] += [[joint.turn_error], [joint.turn_error + joint.tilt]]
-                turning[:2] += value[1:] if joint.kind == TURNS else 0.0
+                before, total = self.sweep(rest, number + 1 if up else joint.parent)
+                turning = before + joint.erring
+                if joint.kind == TURNS:
+                    turning[:2] += value[1:]
                 if joint.lever > 0.0:
                     shift = (joint.lever, 0.0, 0.0)
-                    total += terms(shift, turning if up else before[0])
+                    total = total + terms(shift, turning if up else before)
                 if joint.kind == SLIDES:
-                    total += terms(value, turning)
+                    total = total + terms(value, turning)
             self.sweeps[rest, frame] = turning, total
         return self.sweeps[rest, frame]
 

@@ -12,6 +12,7 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -89,36 +90,26 @@ def _unique(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-class _Run:
-    """One run of the checker; `place` says where it is."""
-
-    def __init__(self) -> None:
-        self.parts = list[Any]()  # those that are checked, and where they are
-
-    @property
-    def place(self) -> str:
-        return self.parts[-1].place if self.parts else "header"
-
-    def check(
-        self, lines: Iterator[dict[str, Any]], problem: Path, trajectory: Path
-    ) -> tuple[str, list[str]]:
-        """What is judged, and what was assumed."""
-        file = read_document(find_problem(problem))
-        robot = file.is_of_robot
-        stated: Any = cell_file(file) if robot else arm_problem(file, other_robot)
-        header = next(lines, {})
-        version, by = header.get("vdsm_certificate"), header.get("versions", {})
-        told = f"is of version {version}, as vdsm-pin {by.get('vdsm_pin')} writes and "
-        claim(version == VERSION, told + f"reads it; expected {VERSION}")
-        asked: Any = (Robot if robot else Arm)(stated, header, trajectory)
-        check_unchanged(trajectory, header["trajectory_sha256"])
-        expected = [pair.names for pair in asked.pairs]
-        claim(header["pairs"] == expected, "the pairs are not those of the problem")
-        self.parts.append(Clearances(asked.tree, asked.path, asked.pairs))
-        first, by_pieces = self.parts[0].check(lines)
-        self.parts.append(asked.rows)
-        asked.rows.check(first, by_pieces)
-        return asked.judged, asked.notes
+def _check(
+    parts: list[Any], lines: Iterator[dict[str, Any]], problem: Path, trajectory: Path
+) -> tuple[str, list[str]]:
+    """What is judged, and what was assumed; `parts` grows by what is checked."""
+    file = read_document(find_problem(problem))
+    robot = file.is_of_robot
+    stated: Any = cell_file(file) if robot else arm_problem(file, other_robot)
+    header = next(lines, {})
+    version, by = header.get("vdsm_certificate"), header.get("versions", {})
+    told = f"is of version {version}, as vdsm-pin {by.get('vdsm_pin')} writes and "
+    claim(version == VERSION, told + f"reads it; expected {VERSION}")
+    asked: Any = (Robot if robot else Arm)(stated, header, trajectory)
+    check_unchanged(trajectory, header["trajectory_sha256"])
+    expected = [pair.names for pair in asked.pairs]
+    claim(header["pairs"] == expected, "the pairs are not those of the problem")
+    parts.append(Clearances(asked.tree, asked.path, asked.pairs))
+    begin = parts[-1].check(lines)
+    parts.append(asked.rows)
+    asked.rows.check(*begin)
+    return asked.judged, asked.notes
 
 
 def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Outcome:
@@ -136,17 +127,18 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
         InvalidFile: If one of the files is not what its format says.
     """
     check_is_file_or_bag(trajectory)
-    run, reason, judged, notes = _Run(), "", "", list[str]()
+    parts = list[Any]([SimpleNamespace(place="header", n_intervals=0, n_claims=0)])
+    reason, judged, notes = "", "", list[str]()
     with ctx.workprec(PRECISION), np.errstate(all="ignore"):
         try:
-            judged, notes = run.check(_lines(certificate), problem, trajectory)
+            judged, notes = _check(parts, _lines(certificate), problem, trajectory)
         except Rejected as error:
-            reason = printable(f"{run.place}: {error}")
+            reason = printable(f"{parts[-1].place}: {error}")
         except DAMAGE as error:
-            text = f"cannot be read as a certificate: {error}"
-            raise InvalidFile(file=certificate, where=run.place, fault=text) from None
-    counts = [(one.n_intervals, one.n_claims) for one in run.parts[:1]] or [(0, 0)]
-    return Outcome(judged, reason, *counts[0], tuple(notes))
+            place, text = parts[-1].place, f"cannot be read as a certificate: {error}"
+            raise InvalidFile(file=certificate, where=place, fault=text) from None
+    seen = parts[:2][-1]
+    return Outcome(judged, reason, seen.n_intervals, seen.n_claims, tuple(notes))
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -162,10 +154,8 @@ def main(arguments: Sequence[str]) -> int:
     try:
         outcome = check_certificate(*map(Path, arguments))
     except (InvalidInput, MemoryError) as error:
-        little = (
-            "there is too little memory; " if isinstance(error, MemoryError) else ""
-        )
-        sys.stderr.write(f"vdsm: {little}{error}".rstrip("; ") + "\n")
+        memory = "there is too little memory; " * isinstance(error, MemoryError)
+        sys.stderr.write(f"vdsm: {memory}{error}".rstrip("; ") + "\n")
         return 2
     found = f"{outcome.n_intervals} intervals, {outcome.n_claims} clearances"
     notes = "; ".join([f"{found} recomputed", *outcome.notes])

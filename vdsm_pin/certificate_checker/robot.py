@@ -18,10 +18,10 @@ from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import (
     Branch,
     Path,
-    always,
     beside,
     columns_of,
     derivative,
+    keeps,
 )
 from vdsm_pin.certificate_checker.solids import (
     CUBE,
@@ -394,4 +394,4 @@ def primitive(name: str, points: Any, cover: Any) -> Solid:
 def within(points: Any, low: float, high: float) -> bool:
     """Whether a polynomial keeps within limits."""
     slack = SLACK * max(1.0, min(abs(low), abs(high)))
-    return always([points], lambda q: low - slack <= q <= high + slack)
+    return keeps(points, low - slack, high + slack)

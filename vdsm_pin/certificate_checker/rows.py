@@ -13,6 +13,7 @@ from vdsm_pin.certificate_checker.motion import (
     Slices,
     always,
     columns_of,
+    keeps,
     part,
 )
 from vdsm_pin.certificate_checker.path import Drawing
@@ -64,27 +65,26 @@ class Rows:
 
     def _limits(self, motion: Interval) -> None:
         """Check the control points, and the change from row to row."""
-        arm, columns = self.problem.manipulator, columns_of(motion.controls)
-        if (most := self.problem.max_row_change) is not None:
+        arm, points = self.problem.manipulator, motion.controls
+        if (limit := self.problem.max_row_change) is not None:
             n = PARTS if motion.degree > 1 else 1
-            times = [(arb(k) / n, arb(k + 1) / n) for k in range(n)]
-            for points in columns[1:]:
-                fine = [q for both in times for q in part(points, *both)]
+            parts = [part(points, arb(k) / n, arb(k + 1) / n) for k in range(n)]
+            for fine in columns_of([row for rows in parts for row in rows])[1:]:
                 turn = reduce(arb.max, fine) - reduce(arb.min, fine)
-                claim(turn <= most + SLACK, "a joint turns by {}°", _deg(turn))
-        low, high = arm.base_range
-        x0, on_rail = columns[0], lambda q: low - SLACK <= q <= high + SLACK
-        claim(always([x0], on_rail), "x0 is {} mm", MM * max(x0, key=abs))
+                claim(turn <= limit + SLACK, "a joint turns by {}°", _deg(turn))
+        (low, high), (x0, *angles) = arm.base_range, columns_of(points)
+        good = keeps(x0, low - SLACK, high + SLACK)
+        claim(good, "x0 is {} mm", MM * max(x0, key=abs))
         most, link = arm.max_joint_angle + SLACK, arb(arm.max_link_angle + SLACK).cos()
 
         def in_cone(a: arb, b: arb) -> bool:  # convex within the box alone
             return abs(a).max(abs(b)) <= most and a.cos() * b.cos() >= link
 
-        for i in range(1, len(columns), 2):
-            both = columns[i : i + 2]
+        for i in range(0, len(angles), 2):
+            both = angles[i : i + 2]
             for name, q in zip(("alpha", "theta"), both, strict=True):
                 told, largest = f"{name}{i // 2 + 1} is {{}}°", max(q, key=abs)
-                claim(always([q], lambda q: abs(q) <= most), told, _deg(largest))
+                claim(keeps(q, -most, most), told, _deg(largest))
             psi = [(a.cos() * b.cos()).acos() for a, b in zip(*both, strict=True)]
             told = f"psi{i // 2 + 1} is {{}}°"
             claim(always(both, in_cone), told, _deg(max(psi, key=float)))
@@ -154,30 +154,27 @@ class Rows:
         """
         if (looks := drawing.looks) is None:
             return
-        begin, run = way
-        slices, limit = [times], looks.cone + SLACK
+        (begin, run), (start, end), h = way, times, times[1] - times[0]
+        slices = Slices(motion.tree, [(motion, start, end)])
+        turning, total = slices.moves(0, self.link, self.last)
+        speed, off, limit = drawing.steepest * abs(run), arb(0), looks.cone + SLACK
         astray, moved = self._astray(motion)
-        while slices:
-            times = slices.pop()
-            h = times[1] - times[0]
-            moves = Slices(motion.tree, [(motion, *times)])
-            turning, total = moves.moves(0, self.link, self.last)
-            speed, off = drawing.steepest * abs(run), arb(0)
-            if drawing.target is not None:
-                speed, off = arb(total[0].item()), moved
-            ends = [self._seen(drawing, motion, t, begin + run * t) for t in times]
-            angle, away = (sum(both) / 2 for both in zip(*ends, strict=True))
-            nearest = away - speed * h / 2
-            worst = angle + turning[0].item() * h / 2 + astray
-            if nearest > off:
-                worst += speed * h / nearest / 2 + off / (nearest - off)
-                if worst <= limit:
-                    continue
-            for one, _ in ends:
-                claim(one <= limit, "the last link looks {}° aside", _deg(one))
-            claim(h > 2.0**-HALVINGS, "the last link may look aside within the errors")
-            middle = (times[0] + times[1]) / 2
-            slices += [(times[0], middle), (middle, times[1])]
+        if drawing.target is not None:
+            speed, off = arb(total[0].item()), moved
+        ends = [self._seen(drawing, motion, t, begin + run * t) for t in times]
+        angle, away = (sum(both) / 2 for both in zip(*ends, strict=True))
+        nearest = away - speed * h / 2
+        worst = angle + turning[0].item() * h / 2 + astray
+        if nearest > off:
+            worst += speed * h / nearest / 2 + off / (nearest - off)
+            if worst <= limit:
+                return
+        for one, _ in ends:
+            claim(one <= limit, "the last link looks {}° aside", _deg(one))
+        claim(h > 2.0**-HALVINGS, "the last link may look aside within the errors")
+        middle = (start + end) / 2
+        for half in ((start, middle), (middle, end)):
+            self._look(drawing, motion, way, half)
 
     def _astray(self, motion: Interval) -> tuple[arb, arb]:
         """What errors turn the last link by, and move the tip.

@@ -57,7 +57,8 @@ class Joint:
     def err(self, value: float, moved: float, tilt: float) -> None:
         """Take other errors."""
         value, moved, self.tilt = UP * value, UP * moved, UP * tilt
-        self.turn_error = value if self.kind == TURNS else 0.0
+        self.turn_error = angle = value if self.kind == TURNS else 0.0
+        self.erring = np.array([[0.0], [0.0], [angle], [angle + self.tilt]])
         self.slip = moved + (value if self.kind == SLIDES else 0.0)
 
     def carries(self, q: Sequence[arb]) -> arb_mat:
