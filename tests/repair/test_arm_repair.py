@@ -112,7 +112,8 @@ def test_ball_on_the_desired_path_is_refused() -> None:
     row = int(np.flatnonzero(motion.on_path)[len(motion.x0) // 2])
     ball = Sphere("ball", problem.path.at(motion.path_m[row : row + 1])[0], 0.05)
     asked = replace(problem, scene=Scene((ball,)))
-    with pytest.raises(Infeasible):
+    told = "link 8 and ball are too near, and the tip is held on its path there"
+    with pytest.raises(Infeasible, match=told):
         repair_arm(asked, motion)
 
 

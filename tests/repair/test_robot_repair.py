@@ -170,6 +170,16 @@ def test_wall_that_no_small_change_leads_round_is_refused(tmp_path: Path) -> Non
         repair_robot(asked(tmp_path, *wall), rows_of(OVER))
 
 
+def test_two_balls_that_are_too_close_to_pass_between_are_named(
+    tmp_path: Path,
+) -> None:
+    x, y = tip_at(0.6, 0.3)
+    balls = (1.04 * x, 1.04 * y, 0.05), (0.9 * x, 0.9 * y - 0.14, 0.05)
+    told = "fore and ball1 are too near, and what moves them apart brings fore and"
+    with pytest.raises(Infeasible, match=f"of the last attempt: {told} ball0 together"):
+        repair_robot(asked(tmp_path, *balls), rows_of(OVER))
+
+
 def test_what_is_written_is_read_back_to_the_same_numbers(tmp_path: Path) -> None:
     """Bit by bit."""
     robot = asked(tmp_path).robot

@@ -17,6 +17,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.repair.causes import Place
 from vdsm_pin.repair.rounds import Origins, Places, Repaired, parts_of, repaired
 from vdsm_pin.repair.slopes import Slopes, joint_scale
 from vdsm_pin.repair.smooth import bulged, on_curve, sampled
@@ -121,6 +122,13 @@ class _Motion:
             changes=rows.changes,
         )
         return replace(self, rows=found, origins=origins, moments=at[kept])
+
+    def at(self, moment: float, margins: dict[int, float]) -> Place:
+        """What pairs have of their margins at a moment in waypoints, and why; [m]."""
+        row = whole_rows(self.slopes.problem, self.rows, np.array([moment]))
+        k, on = int(moment), self.rows.on_path
+        drawing = bool(on[k] & on[min(k + (moment > k), len(on) - 1)])
+        return self.slopes.at(row, margins, drawing)
 
 
 def repair_arm(

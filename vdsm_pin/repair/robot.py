@@ -9,10 +9,12 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
+from vdsm_pin.repair.causes import Place, end_limits
 from vdsm_pin.repair.rounds import Origins, Places, Repaired, parts_of, repaired
 from vdsm_pin.repair.smooth import bulged, on_curve, sampled
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
+from vdsm_pin.robots.model import RobotJoint
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.moving import check_timed
 
@@ -75,6 +77,26 @@ class _Motion:
             rows = replace(rows, q=q)
         rows, origins = rows.only(kept), origins.only(kept)
         return replace(self, rows=rows, moments=at[kept], origins=origins)
+
+    def at(self, moment: float, margins: dict[int, float]) -> Place:
+        """What pairs have of their margins at a moment in waypoints, and why; [m]."""
+        (q,) = self.rows.path.at_moments(np.array([moment]))
+        times = self.rows.times_at(np.array([moment]))
+        others, names = self._others(times, 1), [joint.name for joint in self._joints]
+        slopes = _Slopes(self.cell, np.array([*margins]), np.array([*margins.values()]))
+        ends = np.array([(joint.lower, joint.upper) for joint in self._joints])
+        room = slopes.gaps(q[None], others)[0]
+        steep = [slopes.slope(k, q, others, room[k]) for k in range(len(margins))]
+        return Place(
+            [str(self.cell.asked.pair(k)) for k in margins],
+            room,
+            np.array(steep),
+            end_limits(q, ends, [f"joint {name!r}" for name in names]),
+        )
+
+    @property
+    def _joints(self) -> tuple[RobotJoint, ...]:
+        return self.cell.robot.joints
 
     def _others(self, times: FloatArray | None, n_rows: int) -> FloatArray:
         """Columns of what moves beside rows, shape (n_rows, n_more)."""
@@ -147,8 +169,7 @@ class _Slopes:
                 best, most = q, gaps[k]
             if not -np.inf < gaps[k] < 0.0:
                 break
-            rows = q + STEP * np.eye(len(q))
-            slope = (self._of(k, rows, others) - gaps[k]) / STEP
+            slope = self.slope(k, q, others, gaps[k])
             squared = float(slope @ slope)
             if not squared > 0.0:
                 break
@@ -156,6 +177,13 @@ class _Slopes:
             step *= min(1.0, LONGEST / np.abs(step).max())
             q = np.clip(q + step, *self._limits)
         return best
+
+    def slope(
+        self, k: int, q: FloatArray, others: FloatArray, room: float
+    ) -> FloatArray:
+        """How the room of one pair, that of a row, grows, shape (n_columns,)."""
+        rows = q + STEP * np.eye(len(q))
+        return np.asarray((self._of(k, rows, others) - room) / STEP)
 
     def _of(self, k: int, q: FloatArray, others: FloatArray) -> FloatArray:
         """Room of one pair at rows of q, shape (n_rows,); [m]."""

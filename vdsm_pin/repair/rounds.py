@@ -7,7 +7,7 @@ How rows are pushed is told by who knows the robot.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isnan
+from math import ceil, floor, isnan
 from typing import Any, Final, Generic, Protocol, Self, TypeVar
 
 import numpy as np
@@ -17,6 +17,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.any_problem import AnyMotion
 from vdsm_pin.proof.terms import CERTIFIED
+from vdsm_pin.repair.causes import Place, cause
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import MM_PER_M, in_mm
 from vdsm_pin.verification.brackets import LeastClearances
@@ -248,6 +249,10 @@ class Pushed(Protocol):
         """
         ...
 
+    def at(self, moment: float, margins: dict[int, float]) -> Place:
+        """What pairs have of their margins at a moment in waypoints, and why; [m]."""
+        ...
+
 
 M = TypeVar("M", bound=Pushed)
 
@@ -293,9 +298,22 @@ def repaired(
         found = judge(motion)
     if found.verdict is not Verdict.CERTIFIED:
         deadline.check()  # else what was not judged in time would be the reason
-        raise Infeasible(_why(found))
+        raise Infeasible(_why(found) + _stopped(motion, found.least, near))
     moved = np.abs(motion.rows.joints - motion.origins.base).max(axis=1, initial=0.0)
     return Repaired(motion.rows, found, motion.origins.given, moved)
+
+
+def _stopped(motion: Pushed, least: LeastClearances, near: dict[int, float]) -> str:
+    """What stops the pair that is nearest in the last attempt; "" where none is."""
+    bad = np.flatnonzero((least.verdict != CERTIFIED) & (least.interval >= 0))
+    tried = [k for k in bad[np.argsort(least.upper[bad])].tolist() if k in near]
+    if not tried:
+        return ""
+    moment = float(least.interval[tried[0]] + least.share[tried[0]])
+    rows = {floor(moment), ceil(moment)}
+    beside = [motion.at(float(row), near) for row in sorted(rows)]
+    place, k = motion.at(moment, near), [*near].index(tried[0])
+    return f": {place.names[k]} are too near, and {cause(place, k, beside)}"
 
 
 def _lost(least: LeastClearances, pair: int) -> float:

@@ -1,5 +1,6 @@
 """Rows of a snake arm's motion pushed up the slopes of clearances, the tip held."""
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -9,6 +10,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.paths import Path
+from vdsm_pin.repair.causes import AT_LIMIT, Limit, Place, end_limits
 from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.task import arm_assembly
 
@@ -92,6 +94,45 @@ class Slopes:
             slope = slopes[:, under][worst, np.arange(left.size)]
             q[left] = self._stepped(q[left], slope, -least, tips[left])
         return best
+
+    def at(self, row: FloatArray, margins: dict[int, float], drawing: bool) -> Place:
+        """What pairs have of their margins at a row of q, shape (1, n), and why; [m].
+
+        Args:
+            row: The row.
+            margins: Of the pairs; [m].
+            drawing: Whether the tip is to stay where it is.
+        """
+        width, arm = self._scale.size, self._arm
+        room, slopes = self.room(row, margins)
+        J = self._jacobian(row)[0] / self._scale
+
+        def held(slope: FloatArray) -> FloatArray:
+            along = _least_step(J[None], (J @ slope)[None, :, None])[0]
+            return np.asarray(slope - along)
+
+        each = slopes[:, 0, :width] / self._scale
+        names = [self.names[k] for k in margins]
+        limits = [*end_limits(row[0, :1], np.array([arm.base_range]), ["the base"])]
+        limits = [Limit(one.name, np.eye(width)[0] * one.outwards) for one in limits]
+        limits += self._bent(row[0, 1:width].reshape(-1, 2))
+        return Place(names, room[0], each, limits, held if drawing else None)
+
+    def _bent(self, angles: FloatArray) -> Iterator[Limit]:
+        """Joints at a limit of theirs, angles of shape (N, 2)."""
+        arm, none = self._arm, np.zeros(self._scale.size)
+        psi = link_angles(angles[None, :, 0], angles[None, :, 1])[0]
+        for k, (pair, bend) in enumerate(zip(angles, psi, strict=True)):
+            at_end = np.abs(pair) >= arm.max_joint_angle - AT_LIMIT
+            if bend >= arm.max_link_angle - AT_LIMIT or at_end.all():
+                outwards = pair / np.linalg.norm(pair)
+            elif at_end.any():
+                outwards = np.where(at_end, np.sign(pair), 0.0)
+            else:
+                continue
+            beyond = none.copy()
+            beyond[1 + 2 * k : 3 + 2 * k] = outwards
+            yield Limit(f"joint {k + 1}", beyond)
 
     def _stepped(
         self, q: FloatArray, slope: FloatArray, missing: FloatArray, tips: FloatArray
