@@ -389,9 +389,9 @@ def test_a_rail_that_gains_speed_takes_the_tip_off_its_chord(parts: int) -> None
     rows = SimpleNamespace(
         rows=SimpleNamespace(path_m=np.array([0.0, 1.0]), on_path=np.ones(2, bool)),
         problem=SimpleNamespace(tip_tolerance=1e-9),
-        ordered=True, link=1, last=0.0, _look=lambda *_: None,
+        ordered=True, link=1, last=0.0, _look=lambda *_: None, drawing=drawing,
     )  # fmt: skip
     ends = np.arange(parts + 1) / parts
     tips = [arb_mat([[arb(t) ** 3], [0], [0]]) for t in ends.tolist()]
-    Rows._draw(rows, drawing, (0, 1), motion, tips)  # type: ignore[arg-type]
+    Rows._draw(rows, (0, 1), motion, tips)  # type: ignore[arg-type]
     assert bends == pytest.approx(6.0 * ends[1:] / (8.0 * parts**2), rel=1e-9)

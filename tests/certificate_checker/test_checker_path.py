@@ -206,9 +206,9 @@ def test_rounding_is_all_that_a_drawing_may_fall_short(
         coverage=lambda: 0.5 + drawn, deviation=0.1 + strays, farthest=2.0, length=2.0,
         left=False, closed=False,
     )  # fmt: skip
-    rows: Any = SimpleNamespace(problem=asked, ordered=True)
+    rows: Any = SimpleNamespace(problem=asked, ordered=True, drawing=drawing)
     if said:
         with pytest.raises(Rejected, match=said):
-            Rows._drawn(rows, drawing)
+            Rows._drawn(rows)
     else:
-        Rows._drawn(rows, drawing)
+        Rows._drawn(rows)

@@ -65,9 +65,7 @@ class Clearances:
             for pair, proof in zip(self.pairs, line["proofs"], strict=True):
                 self.place = f"interval {k}, {' and '.join(pair.names)}"
                 planes = [*tiled(pair, proof, self.place, motion)]
-                if any(
-                    x.last - x.first < len(pair.partner.solid.points) for x in planes
-                ):
+                if any(x.last < len(pair.partner.solid.points) for x in planes):
                     by_pieces.add(pair)
                 self.waiting[pair] += planes
                 self.n_claims += len(planes)

@@ -2,9 +2,9 @@
 
 from collections.abc import Set
 from functools import reduce
+from math import degrees
 from typing import Any, Final
 
-import numpy as np
 from flint import arb, arb_mat
 
 from vdsm_pin.certificate_checker.balls import MM, SLACK, angle, claim, column, norm
@@ -37,7 +37,7 @@ class Rows:
     def __init__(self, arm: Any, rows: Trajectory) -> None:
         self.arm, self.rows, self.problem = arm, rows, arm.problem
         self.place, path = "header", self.problem.tip_path
-        self.drawing = None if path is None else Drawing(path)
+        self.drawing: Any = None if path is None else Drawing(path)
         self.ordered = path is not None and path.order == "as_given"
         self.link, self.last = frame_of(len(arm.lengths)), arm.lengths[-1]
 
@@ -61,7 +61,7 @@ class Rows:
             before = motion.pose(1.0)
         self.place = "header"
         if self.drawing is not None:
-            self._drawn(self.drawing)
+            self._drawn()
 
     def _limits(self, motion: Interval) -> None:
         """Check the control points, and the change from row to row."""
@@ -71,7 +71,7 @@ class Rows:
             parts = [part(points, arb(k) / n, arb(k + 1) / n) for k in range(n)]
             for fine in columns_of([row for rows in parts for row in rows])[1:]:
                 turn = reduce(arb.max, fine) - reduce(arb.min, fine)
-                claim(turn <= limit + SLACK, "a joint turns by {}°", _deg(turn))
+                claim(turn <= limit + SLACK, "a joint turns by {}°", degrees(turn))
         (low, high), (x0, *angles) = arm.base_range, columns_of(points)
         good = keeps(x0, low - SLACK, high + SLACK)
         claim(good, "x0 is {} mm", MM * max(x0, key=abs))
@@ -84,10 +84,10 @@ class Rows:
             both = angles[i : i + 2]
             for name, q in zip(("alpha", "theta"), both, strict=True):
                 told, largest = f"{name}{i // 2 + 1} is {{}}°", max(q, key=abs)
-                claim(keeps(q, -most, most), told, _deg(largest))
+                claim(keeps(q, -most, most), told, degrees(largest))
             psi = [(a.cos() * b.cos()).acos() for a, b in zip(*both, strict=True)]
             told = f"psi{i // 2 + 1} is {{}}°"
-            claim(always(both, in_cone), told, _deg(max(psi, key=float)))
+            claim(always(both, in_cone), told, degrees(max(psi, key=float)))
 
     def _tips(self, rows: tuple[int, int], motion: Interval) -> None:
         """Check the tip between two rows."""
@@ -99,7 +99,7 @@ class Rows:
         if rows[1] == self.rows.n_samples - 1:
             self._end("goal", self.problem.goal, rows[1], tips[-1])
         if self.drawing is not None:
-            self._draw(self.drawing, rows, motion, tips)
+            self._draw(rows, motion, tips)
 
     def _tip(self, motion: Interval, time: float) -> arb_mat:
         return point_of(motion.pose(time)[self.link], self.last, 0, 0)
@@ -117,10 +117,9 @@ class Rows:
             for way in (off[0], *(lever * angle for angle in off[1:])):
                 claim(way <= most, f"the joints are {{}} mm off their {name}", MM * way)
 
-    def _draw(
-        self, drawing: Drawing, rows: tuple[int, int], motion: Interval, tips: Any
-    ) -> None:
+    def _draw(self, rows: tuple[int, int], motion: Interval, tips: Any) -> None:
         """Take what the tip does at both rows and in between into the drawing."""
+        drawing = self.drawing
         stations = [arb(float(self.rows.path_m[row])) for row in rows]
         on, same = self.rows.on_path[[*rows]], arb(self.problem.tip_tolerance)
         # The first row was taken in with the interval before, where there is one.
@@ -130,12 +129,12 @@ class Rows:
             ahead = drawing.visit(stations[i], bool(on[0]), same)
             forwards = ahead >= -same - SLACK or not self.ordered
             claim(forwards, "the path is drawn {} mm backwards", -MM * ahead)
-            self._look(drawing, motion, (stations[i], arb(0)), (float(i), float(i)))
+            self._look(motion, (stations[i], arb(0)), (float(i), float(i)))
         if not on.all():
             drawing.last = None
             return
         begin, run = drawing.local(stations[0]), drawing.step(*stations)
-        self._look(drawing, motion, (begin, run), (0.0, 1.0))
+        self._look(motion, (begin, run), (0.0, 1.0))
         parts = len(tips) - 1
         times = [(k / parts, (k + 1) / parts) for k in range(parts)]
         slices = Slices(motion.tree, [(motion, *both) for both in times])
@@ -143,16 +142,15 @@ class Rows:
         for k, bend in enumerate(bends):
             drawing.draw(begin, run / parts, tips[k : k + 2], bend / (8 * parts**2))
 
-    def _look(
-        self, drawing: Drawing, motion: Interval, way: tuple[arb, arb], times: Any
-    ) -> None:
+    def _look(self, motion: Interval, way: tuple[arb, arb], times: Any) -> None:
         """Check that the last link looks into its cone all through a slice.
 
         The angle is the mean of those at both ends at most, half of what the axis and
         the aim turn in between, and what errors turn both; slices are halved until
         that is enough.
         """
-        if (looks := drawing.looks) is None:
+        drawing, looks = self.drawing, self.drawing.looks
+        if looks is None:
             return
         (begin, run), (start, end), h = way, times, times[1] - times[0]
         slices = Slices(motion.tree, [(motion, start, end)])
@@ -161,20 +159,20 @@ class Rows:
         astray, moved = self._astray(motion)
         if drawing.target is not None:
             speed, off = arb(total[0].item()), moved
-        ends = [self._seen(drawing, motion, t, begin + run * t) for t in times]
-        angle, away = (sum(both) / 2 for both in zip(*ends, strict=True))
+        ends = [self._seen(motion, t, begin + run * t) for t in times]
+        aside, away = (sum(both) / 2 for both in zip(*ends, strict=True))
         nearest = away - speed * h / 2
-        worst = angle + turning[0].item() * h / 2 + astray
+        worst = aside + turning[0].item() * h / 2 + astray
         if nearest > off:
             worst += speed * h / nearest / 2 + off / (nearest - off)
             if worst <= limit:
                 return
         for one, _ in ends:
-            claim(one <= limit, "the last link looks {}° aside", _deg(one))
+            claim(one <= limit, "the last link looks {}° aside", degrees(one))
         claim(h > 2.0**-HALVINGS, "the last link may look aside within the errors")
         middle = (start + end) / 2
         for half in ((start, middle), (middle, end)):
-            self._look(drawing, motion, way, half)
+            self._look(motion, way, half)
 
     def _astray(self, motion: Interval) -> tuple[arb, arb]:
         """What errors turn the last link by, and move the tip.
@@ -193,16 +191,15 @@ class Rows:
             turned, moved, lever = turned + turn, moved + turn * lever, lever - length
         return turned, moved
 
-    def _seen(
-        self, drawing: Drawing, motion: Interval, time: float, station: arb
-    ) -> tuple[arb, arb]:
+    def _seen(self, motion: Interval, time: float, station: arb) -> tuple[arb, arb]:
         """Angle of the last link to where it shall look, and how far away that is."""
         axis = column(*motion.pose(time)[self.link].entries()[::4][:3])
-        aim = drawing.aim(station, self._tip(motion, time))
+        aim = self.drawing.aim(station, self._tip(motion, time))
         return angle(axis, aim), norm(aim)
 
-    def _drawn(self, drawing: Drawing) -> None:
+    def _drawn(self) -> None:
         """Check how much of the path is drawn, how well, and that it is drawn once."""
+        drawing = self.drawing
         path, drawn = self.problem.path, drawing.coverage()
         past = drawing.farthest - drawing.length - self.problem.tip_tolerance
         once = past <= SLACK or not (self.ordered and drawing.left and drawing.closed)
@@ -212,7 +209,3 @@ class Rows:
         claim(strays <= most + SLACK, told, MM * strays, MM * most)
         enough = drawn >= path.required_coverage - SLACK
         claim(enough, "coverage is {}, required is {}", drawn, path.required_coverage)
-
-
-def _deg(angle: arb) -> float:
-    return float(np.rad2deg(float(angle)))
