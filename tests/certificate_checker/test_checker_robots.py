@@ -338,12 +338,8 @@ def test_link_pairs_left_out_are_counted(tmp_path: Path) -> None:
     robot: Any = Robot.__new__(Robot)
     robot.model, robot.tree, robot.notes = model, model.tree, []
     robot.links = {x.name: Body(x.frame, x(told)) for x in model.links()}
-    robot.scene = SimpleNamespace(obstacles=[])
-    robot.rests = []
-    stated = {"joints_rad": {"jb": 0.0, "jc": 0.0}, "joints_m": {}}
-    stated |= {"base": [0.0, 0.0], "obstacles": {}}
-    file: Any = SimpleNamespace(errors=lambda _: ErrorBox(), required=(0.1, 0.1))
-    pairs = [*robot._pairs(file, {"errors": stated}, [])]
+    robot.obstacles = []
+    pairs = [*robot._pairs(0.1, 0.1)]
     assert [{*pair.names} for pair in pairs] == [{"a", "c"}]
     assert robot.notes == ["2 of 3 link pairs left out"]
 

@@ -301,7 +301,7 @@ class Robot:
         size = float(sum(joint.lever for joint in model.joints)) or 1.0
         names = {name for name, frame in model.frames.items() if frame != 1}
         found = file.scene(size, names, other_robot)
-        self.scene, source = found.scene, file.source(model.more, found).sha256
+        scene, source = found.scene, file.source(model.more, found).sha256
         belongs(header, "errors topic", source, sha256_of_file(trajectory))
         how, told = header["interpolation"], header["links"]
         own = model.branch(trajectory, header["topic"], how)
@@ -309,24 +309,24 @@ class Robot:
         claim(how == joined, f"interpolation is {how}, the file's is {joined}")
         self.own, self.timed = Path(own), own.timed and len(own.knots) > 1
         self.links = {x.name: Body(x.frame, x(told)) for x in model.links()}
-        things = [solid(one, told) for one in self.scene.obstacles]
+        things = [solid(one, told) for one in scene.obstacles]
         cover(things, header, self.links)
-        self.tree, self.path, self.rests = beside(
-            own, model.joints, self.scene.obstacles
-        )
+        self.tree, self.path, at = beside(own, model.joints, scene.obstacles)
+        stated, asked = header["errors"], file.errors(scene)
+        off = grown(stated, asked, model.least_errors(asked), things)
+        model.err(stated)
+        self.obstacles = [Body(*one) for one in zip(at, things, off, strict=True)]
         self.notes = [file.robot.solids.words, f"{joined} pieces", *model.notes]
-        self.pairs = [*self._pairs(file, header, things)]
+        self.pairs = [*self._pairs(*file.required)]
+        self.notes += [note for one in things for note in one.notes()]
+        self.notes += sizes(scene.obstacles)
 
-    def _pairs(self, file: CellFile, header: Any, things: list[Any]) -> Iterator[Pair]:
-        """What the problem holds apart, in order."""
-        stated, links, asked = header["errors"], self.links, file.errors(self.scene)
-        off = grown(stated, asked, self.model.least_errors(asked), things)
-        self.model.err(stated)
-        required, own = file.required
-        obstacles = zip(self.rests, things, off, strict=True)
-        for obstacle, link in product(obstacles, links.values()):
+    def _pairs(self, required: float, own: float) -> Iterator[Pair]:
+        """What the problem holds apart, in order: from obstacles, then links."""
+        links = self.links
+        for obstacle, link in product(self.obstacles, links.values()):
             for part in link.solid.parts:
-                yield Pair(Body(link.frame, part), Body(*obstacle), required)
+                yield Pair(Body(link.frame, part), obstacle, required)
         left = self.model.srdf.disabled() if self.model.srdf else {}
         pairs = [*combinations(links, 2)]
         apart = [names for names in pairs if self._held(*names, left)]
@@ -336,8 +336,6 @@ class Robot:
             for part in link.solid.parts:
                 yield Pair(Body(link.frame, part), rest, own)
         self.notes += [f"{len(pairs) - len(apart)} of {len(pairs)} link pairs left out"]
-        self.notes += [note for one in things for note in one.notes()]
-        self.notes += sizes(self.scene.obstacles)
 
     def _held(self, one: str, other: str, left: Any) -> bool:
         """Whether two links are held apart."""
