@@ -3,6 +3,8 @@
 import itertools
 import json
 import shutil
+import subprocess
+import sys
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -609,6 +611,60 @@ def test_trajectories_are_converted(
     for asked in (words, ("convert", cell, "--trajectory")):
         assert run(*asked, out / "trajectory.csv", "--topic", "a", "--out", back) == 2
         assert "is no bag, so topic 'a' has no" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", [".json", ".mcap", ".bag"])
+def test_times_of_whole_nanoseconds_come_back(
+    tmp_path: Path, robot: Robot, ending: str
+) -> None:
+    """Of any length, stamps of our day too: their nearest doubles, to the last bit."""
+    rng = np.random.default_rng(3)
+    nanos = np.sort(rng.integers(0, 2 * 10 ** rng.integers(8, 19, 200)))
+    times = np.array([*dict.fromkeys(k / 10**9 for k in nanos.tolist())])
+    given = JointTrajectory(("turn", "slide"), np.zeros((len(times), 2)), times)
+    found = read_motion(written(tmp_path, ending, given, robot), robot.joints)
+    assert len(times) > 150
+    np.testing.assert_array_equal(found.times, times)
+
+
+@pytest.mark.parametrize("name", [*conversion.FORMATS])
+def test_times_that_no_duration_tells_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    write(tmp_path, "two.urdf", URDF)
+    cell, out = write(tmp_path, "cell.yaml", CELL + SCENE), tmp_path / "out"
+    for times, expected in {
+        (0.0, 3e9): "time is 3e+09 s, but durations of ROS end at",
+        (-1e300, 0.0): "time is -1e+300 s, but durations",
+        (1.0, 1.0 + 1e-12): "a nanosecond apart",
+    }.items():
+        rows = "".join(f"0,0,{time!r}\n" for time in times)
+        file = write(tmp_path, "t.csv", f"turn_rad,slide_m,time_s\n{rows}")
+        asked = "convert", cell, "--trajectory", file, "--also", name, "--out", out
+        assert run(*asked) == 2
+        assert expected in capsys.readouterr().err
+        assert not [*out.iterdir()]
+
+
+def test_a_disk_that_is_full_is_told(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    code = (
+        "import resource, sys\nfrom vdsm_pin.cli import main\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\nmain(sys.argv[1:])\n"
+    )
+    write(tmp_path, "two.urdf", URDF)
+    cell = write(tmp_path, "cell.yaml", CELL + SCENE)
+    file = write(tmp_path, "t.csv", "turn_rad,slide_m,time_s\n0,0,0\n0,0,1\n")
+    asked = ["convert", cell, "--trajectory", file, "--also", "db3", "--out", tmp_path]
+    done = subprocess.run(
+        [sys.executable, "-c", code, *map(str, asked[:-1]), str(tmp_path / "out")],
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert done.returncode == 2
+    assert "trajectory: cannot be written: disk I/O error" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("ending", FORMATS)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput
 from vdsm_pin.io.places import Place
 from vdsm_pin.io.source import naming_file
 from vdsm_pin.io.trajectory_messages import message_of, of_message
@@ -190,7 +190,8 @@ def write_bag(motion: JointTrajectory, file: Path) -> None:
             for the folder of a ROS 2 bag, with metadata.yaml and a .db3.
 
     Raises:
-        InvalidInput: If rosbags is not installed.
+        InvalidInput: If rosbags is not installed, or times are no durations of ROS.
+        CannotWrite: If the file system refuses.
     """
     if find_spec("rosbags") is None:
         what = file.suffix or "a ROS 2 bag"
@@ -207,7 +208,18 @@ def write_bag(motion: JointTrajectory, file: Path) -> None:
             data = store.serialize_ros1(_typed(store, motion), PLANS[0])
             writer.write(connection, 0, data)
         return
+    import sqlite3  # which few need
+
+    try:
+        _write_ros2(motion, file)
+    except sqlite3.Error as error:
+        raise CannotWrite(file=file, reason=str(error)) from error
+
+
+def _write_ros2(motion: JointTrajectory, file: Path) -> None:
+    """Write a MCAP file, or the folder of a ROS 2 bag where the name has no ending."""
     from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
 
     store, whole = get_typestore(Stores.ROS2_HUMBLE), not file.suffix
     kind = StoragePlugin.SQLITE3 if whole else StoragePlugin.MCAP

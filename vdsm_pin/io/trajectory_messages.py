@@ -1,6 +1,7 @@
 """Trajectories of named joints: JointTrajectory and RobotTrajectory as YAML or JSON."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,7 +21,12 @@ MAX_BYTES: Final = 256 << 20
 MULTI: Final = "multi_dof_joint_trajectory"
 _FREE: Final = ("x", "y", "z", "yaw", "pitch", "roll")
 _DERIVATIVES: Final = "velocities", "accelerations"
-_NANO: Final = 1e-9
+_NANOS: Final = 1_000_000_000
+"""Nanoseconds of a second."""
+
+_LONGEST: Final = 1 << 31
+"""Beyond what a duration of ROS has, either way; [s]."""
+
 _TIMES: Final = ("sec", "nanosec"), ("secs", "nsecs")
 """Keys of a duration in ROS 2, and in ROS 1."""
 
@@ -146,7 +152,10 @@ def _seconds(time: Place) -> float:
     if (numbers := finite_numbers(parts, 2)) is None:
         fault = f"is {str(stated)[:60]}, expected seconds"
         raise time.invalid(fault)
-    return numbers[0] + _NANO * numbers[1]
+    seconds, nanos = numbers
+    if abs(seconds) < _LONGEST and all(value.is_integer() for value in numbers):
+        return (int(seconds) * _NANOS + int(nanos)) / _NANOS  # rounded once
+    return seconds + nanos / _NANOS
 
 
 def _multi(message: Place, most: int) -> JointTrajectory:
@@ -231,7 +240,13 @@ def _together(one: JointTrajectory, other: JointTrajectory) -> JointTrajectory:
 
 
 def message_of(motion: JointTrajectory) -> dict[str, Any]:
-    """The same as a JointTrajectory of ROS 2, in mappings, lists and numbers."""
+    """The same as a JointTrajectory of ROS 2, in mappings, lists and numbers.
+
+    Raises:
+        InvalidInput: If times are further from 0 than a duration of ROS can be, or
+            nearer to each other than it tells.
+    """
+    _check_durations(motion.times)
     points: list[dict[str, Any]] = []
     for k, row in enumerate(motion.q.tolist()):
         point: dict[str, Any] = {"positions": row}
@@ -247,8 +262,28 @@ def message_of(motion: JointTrajectory) -> dict[str, Any]:
 
 def duration(seconds: float) -> dict[str, int]:
     """A duration of ROS 2, to the nanosecond; [s]."""
-    whole, part = divmod(round(seconds / _NANO), round(1.0 / _NANO))
-    return {"sec": whole, "nanosec": part}
+    whole = math.floor(seconds)
+    part = round((seconds - whole) * _NANOS)
+    return {"sec": whole + part // _NANOS, "nanosec": part % _NANOS}
+
+
+def _check_durations(times: FloatArray | None) -> None:
+    """Refuse times that durations of ROS cannot tell.
+
+    Raises:
+        InvalidInput: If there are such.
+    """
+    if times is None:
+        return
+    if not (np.abs(times) < _LONGEST - 1).all():
+        far = times[np.argmax(np.abs(times))]
+        message = f"time is {far:g} s, but durations of ROS end at {_LONGEST} s"
+        raise InvalidInput(message)
+    told = [duration(time) for time in times.tolist()]
+    nanos = np.array([one["sec"] * _NANOS + one["nanosec"] for one in told])
+    if ((np.diff(nanos) == 0) & (np.diff(times) > 0.0)).any():
+        message = "times are to be a nanosecond apart, which durations of ROS tell"
+        raise InvalidInput(message)
 
 
 def text_of(motion: JointTrajectory, ending: str, *, of_robot: bool = False) -> str:

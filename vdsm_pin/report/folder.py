@@ -153,7 +153,8 @@ def staged(folder: Path, within: Path | None = None) -> Iterator[Path]:
                             path.replace(place)
             except CannotWrite as error:  # of a staged file, whose place says nothing
                 file = Path(error.file)
-                told = folder / file.name if file.parent == staging else file
+                ours = staging in file.parents
+                told = folder / file.relative_to(staging) if ours else file
                 raise CannotWrite(file=told, reason=error.reason) from error
 
 

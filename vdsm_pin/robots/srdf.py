@@ -95,7 +95,7 @@ class Srdf:
         those that it enables; then, whatever is enabled, those that it disables.
         """
         found = dict[frozenset[str], str]()
-        for link in self._by_default():
+        for link in self._links.intersection(self._by_default()):
             why = f"left out by the SRDF: disable_default_collisions of {link!r}"
             found |= {frozenset((link, other)): why for other in sorted(self._links)}
         for pair, _ in self._pairs(ENABLE):
