@@ -1,5 +1,6 @@
 """What a robot is read as: groups, bases, limits, covers; Pinocchio agrees."""
 
+import json
 import re
 import subprocess
 import sys
@@ -10,8 +11,11 @@ import numpy as np
 import pytest
 from oracles.certificate_cases import write_cube
 from oracles.random_robots import MESH
+from typer.testing import CliRunner
 
 from tests.robots.test_robots import URDF, mutated, write
+from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.cli import app
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
@@ -533,6 +537,56 @@ def test_xacro_is_expanded(tmp_path: Path) -> None:
     for bad in (text.replace("0.05 *", "length *"), text[:300], large):
         with pytest.raises(InvalidFile, match="is not expanded by xacrodoc"):
             read_robot(RobotFiles(write(tmp_path, "two.urdf.xacro", bad)))
+
+
+XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="tall" default="false"/><link name="foot"/>
+<link name="arm"><collision><origin xyz="0 0 ${SIZE}"/><geometry>
+<sphere radius="$(arg size)"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="foot"/><child link="arm"/>
+<axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+</robot>"""
+SIZE = "'$(arg tall)' == 'true' and 2.0 or 1.0"
+
+
+def test_xacro_files_are_given_their_arguments(tmp_path: Path) -> None:
+    """In problem files and options, by the proof, the certificate and its checker."""
+    pytest.importorskip("xacrodoc")
+    file = write(tmp_path, "arm.xacro", XACRO.replace("SIZE", SIZE))
+    with pytest.raises(InvalidFile, match="argument size; give it as --xacro-arg NAME"):
+        read_robot(RobotFiles(file))
+    with pytest.raises(InvalidFile, match="'-o', expected a name of letters"):
+        read_robot(RobotFiles(file, xacro_args={"-o": "x"}))
+    plain = write(tmp_path, "plain.urdf", URDF)
+    with pytest.raises(InvalidFile, match=r"is no xacro file, .* and is given size"):
+        read_robot(RobotFiles(plain, xacro_args={"size": "0.1"}))
+    stated = "vdsm_problem: 1\nlength_unit: m\nrequired_clearance: 0\n"
+    stated += "robot: {urdf: arm.xacro, "
+    stated += "xacro_args: {size: 0.25, tall: true}}\nobstacles:\n"
+    stated += "  - {name: post, shape: sphere, center: [0, 0, 3.0], radius: 0.5}\n"
+    problem = write(tmp_path, "p.yaml", stated)
+    rows = write(tmp_path, "t.csv", "turn_rad\n-0.5\n0.5\n")
+    certificate = tmp_path / "c.certificate"
+    scene = write(
+        tmp_path, "s.yaml", "length_unit: m\n" + stated[stated.index("obs") :]
+    )
+    options = ["--urdf", str(file), "--xacro-arg", "size=0.25", "--xacro-arg"]
+    for asked in ([str(problem)], [*options, "tall=true", "--scene", str(scene)]):
+        words = ["verify", *asked, "--trajectory", str(rows), "--certificate"]
+        words += [str(certificate), "--out", str(tmp_path / "out")]
+        ended = CliRunner().invoke(app, words, obj="vdsm verify")
+        assert ended.exit_code == 0, ended.output
+        found = json.loads((tmp_path / "out" / "verification.json").read_text())
+        assert found["min_clearance"]["lower_m"] == pytest.approx(0.25, abs=2e-6)
+        stated_in = [tmp_path / "c.certificate.yaml", problem]
+        of = next(one for one in stated_in if one.exists())
+        assert check_certificate(certificate, of, rows).accepted
+    words = ["verify", *options[:2], "--xacro-arg", "size", "--trajectory", str(rows)]
+    ended = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "o")], obj="v")
+    assert isinstance(
+        ended.exception, InvalidInput
+    )  # what the command exits with 2 for
+    assert "expected NAME=VALUE" in str(ended.exception)
 
 
 def test_xacro_is_expanded_where_memory_is_limited_already(tmp_path: Path) -> None:

@@ -42,6 +42,7 @@ def problem_text(
         "bodies": files.solids.cover,
         "parts": files.solids.parts if files.solids.cover == "parts" else None,
         "joint_limits": named(files.joint_limits),
+        "xacro_args": dict(files.xacro_args),
     }
     whole = {
         "vdsm_problem": 1,

@@ -96,7 +96,7 @@ class Model:
 
     def __init__(self, files: RobotFiles, pose: Any) -> None:
         self.files, self.lock, self.moved = files, files.lock, list[RobotJoint]()
-        text, included = urdf_text(files.urdf, files.package_dirs)
+        text, included = urdf_text(files.urdf, files.package_dirs, files.xacro_args)
         self.document = document = validate_urdf(text, geometry_only=True)
         meshes = map(self._mesh, document.findall("link/collision/geometry/mesh"))
         self.more = (*included, *dict.fromkeys(meshes))

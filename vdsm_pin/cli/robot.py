@@ -1,6 +1,6 @@
 """What commands ask about a robot of a URDF: by options, or in a problem file."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
@@ -64,6 +64,10 @@ class RobotOptions(NamedTuple):
     joint_limits: Annotated[
         Path | None, option("FILE", "A joint_limits.yaml; the stricter limit counts.")
     ] = None
+    xacro_arg: Annotated[
+        list[str] | None,
+        option("NAME=VALUE", "What $(arg NAME) is in a xacro file; again for more."),
+    ] = None
 
     def cell(self) -> "Cell":
         """The robot and what it is held to.
@@ -103,12 +107,29 @@ class RobotOptions(NamedTuple):
             group=self.group,
             solids=solids_of(self.bodies, self.parts),
             joint_limits=self.joint_limits,
+            xacro_args=_arguments(self.xacro_arg or ()),
         )
 
     def named(self) -> dict[str, object]:
         """By the names of the command line."""
         given = self._asdict().items()
         return {f"--{name.replace('_', '-')}": value for name, value in given}
+
+
+def _arguments(given: Sequence[str]) -> dict[str, str]:
+    """Arguments of a xacro file by their names.
+
+    Raises:
+        InvalidInput: If one has no name or no value, or a name is given twice.
+    """
+    found = dict[str, str]()
+    for word in given:
+        name, equals, value = word.partition("=")
+        if not name or not equals or name in found:
+            message = f"--xacro-arg is {word!r}, expected NAME=VALUE, each name once"
+            raise InvalidInput(message)
+        found[name] = value
+    return found
 
 
 def refuse_beside(what: str, options: Mapping[str, object]) -> None:

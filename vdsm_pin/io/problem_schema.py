@@ -29,6 +29,8 @@ from vdsm_pin.io.schema_types import (
     Vector,
 )
 
+XacroValue: TypeAlias = bool | int | float | str
+
 CoverKind: TypeAlias = Literal["hull", "parts", "primitives"]
 
 
@@ -62,6 +64,9 @@ class RobotModel(FileModel):
     )
     joint_limits: str | None = Field(
         default=None, description="A joint_limits.yaml of MoveIt; the stricter counts."
+    )
+    xacro_args: dict[str, XacroValue] = Field(
+        default={}, description="What $(arg NAME) stands for in a xacro file."
     )
 
 

@@ -20,7 +20,12 @@ from vdsm_pin.io.others import OtherReader, ReadRobot
 from vdsm_pin.io.problem_builder import joined
 from vdsm_pin.io.problem_errors import ErrorCollector, checked
 from vdsm_pin.io.problem_file import ProblemDocument, files_of_obstacles
-from vdsm_pin.io.problem_schema import AnyProblemModel, CoverKind, RobotModel
+from vdsm_pin.io.problem_schema import (
+    AnyProblemModel,
+    CoverKind,
+    RobotModel,
+    XacroValue,
+)
 from vdsm_pin.io.source import add_file, path_of
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.any_problem import ProblemSource
@@ -122,6 +127,7 @@ class RobotFiles:
             at 0. None: all move that are not locked.
         solids: What stands for the meshes of links.
         joint_limits: A joint_limits.yaml of MoveIt; the stricter limit counts.
+        xacro_args: What `$(arg NAME)` stands for in a xacro file.
 
     Example:
         >>> vp.RobotFiles("robot.urdf", "robot.srdf", group="arm").group
@@ -135,6 +141,7 @@ class RobotFiles:
     group: str | None = None
     solids: MeshCover = HULLS
     joint_limits: Path | None = None
+    xacro_args: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take names of files for their paths."""
@@ -162,7 +169,13 @@ def files_of_robot(model: RobotModel, folder: Path) -> RobotFiles:
         model.group,
         solids_of(model.bodies, model.parts),
         limits,
+        {name: _word(value) for name, value in model.xacro_args.items()},
     )
+
+
+def _word(value: XacroValue) -> str:
+    """The value of an argument as xacro writes it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def solids_of(bodies: CoverKind | None, parts: int | None) -> MeshCover:

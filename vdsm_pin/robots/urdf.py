@@ -33,7 +33,7 @@ def read_robot(files: RobotFiles) -> Robot:
         InvalidInput: If a group is named without a SRDF.
     """
     urdf, group, solids = files.urdf, files.group, files.solids
-    text, included = urdf_text(urdf, files.package_dirs)
+    text, included = urdf_text(urdf, files.package_dirs, files.xacro_args)
     with naming_file(urdf):
         document = validate_urdf(text, geometry_only=True)
     more = Srdf(files.srdf, document) if files.srdf is not None else None

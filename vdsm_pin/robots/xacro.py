@@ -1,11 +1,14 @@
 """The text of a URDF; a xacro file is expanded by xacrodoc (extra `xacro`)."""
 
 import json
+import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 from vdsm_pin.errors import InvalidFile
@@ -27,45 +30,59 @@ finally:
 """
 """Expands a file within 4 GiB, and prints in its last line which others it has read."""
 
+UNDEFINED: Final = "Undefined substitution argument"
+"""What xacro says of an argument that was not given."""
+
 SLOWEST: Final = 60.0
 """How long an expansion may take; [s]."""
 
 
 def urdf_text(
-    path: Path, package_dirs: tuple[Path, ...] = ()
+    path: Path,
+    package_dirs: tuple[Path, ...] = (),
+    arguments: Mapping[str, str] = MappingProxyType({}),
 ) -> tuple[str, tuple[Path, ...]]:
     """The URDF in a file, and the files that this one includes.
 
     Args:
         path: A URDF, or a xacro file by its ending `.xacro`.
         package_dirs: Where `$(find NAME)` looks for packages.
+        arguments: What `$(arg NAME)` stands for in a xacro file.
 
     Raises:
         InvalidFile: If it cannot be read or expanded, or xacrodoc is not installed.
     """
     if path.suffix.lower() != ".xacro":
+        if arguments:
+            given = ", ".join(arguments)
+            fault = f"is no xacro file, which ends in .xacro, and is given {given}"
+            raise InvalidFile(file=path, fault=fault)
         return declared(read_text(path, limit=MAX_BYTES)), ()
     check_is_file(path)
+    for name in arguments:
+        if not re.fullmatch(r"\w[\w.-]*", name):
+            fault = f"xacro argument {name!r}, expected a name of letters, digits, _.-"
+            raise InvalidFile(file=path, fault=fault)
     if find_spec("xacrodoc") is None:
         fault = "xacro needs xacrodoc: pip install 'vdsm-pin[xacro]'"
         raise InvalidFile(file=path, fault=fault)
     with tempfile.TemporaryDirectory() as folder:
-        return _expanded(path, package_dirs, Path(folder) / "robot.urdf")
+        words = [f"{name}:={value}" for name, value in arguments.items()]
+        for one in package_dirs:
+            words += ["-d", str(one.resolve())]
+        return _expanded(path, words, Path(folder) / "robot.urdf")
 
 
-def _expanded(
-    path: Path, package_dirs: tuple[Path, ...], out: Path
-) -> tuple[str, tuple[Path, ...]]:
+def _expanded(path: Path, words: list[str], out: Path) -> tuple[str, tuple[Path, ...]]:
     """The text that xacrodoc makes, in a process of its own: macros are programs.
 
     It takes names that are relative from where it runs, which is beside the file.
     """
     beside = path.resolve().parent
-    places = [word for folder in package_dirs for word in ("-d", str(folder.resolve()))]
     command = [sys.executable, "-c", SCRIPT, str(path.resolve()), "-o", str(out)]
     try:
         done = subprocess.run(
-            [*command, *places],
+            [*command, *words],
             capture_output=True,
             text=True,
             errors="replace",
@@ -79,6 +96,8 @@ def _expanded(
     if done.returncode or not out.is_file():
         said = done.stderr.strip().splitlines() or ["no output"]
         fault = f"is not expanded by xacrodoc: {said[-1].strip()}"
+        if UNDEFINED in said[-1]:
+            fault += "; give it as --xacro-arg NAME=VALUE or in xacro_args"
         raise InvalidFile(file=path, fault=fault)
     named = dict.fromkeys(json.loads(done.stdout.splitlines()[-1]))
     included = dict.fromkeys((beside / name).resolve() for name in named)
