@@ -67,19 +67,17 @@ def numbers(words: str) -> list[float]:
     return [*map(float, words.split())]
 
 
-def placed(element: ET.Element) -> list[list[Any]]:
+def placed(element: ET.Element) -> arb_mat:
     """T_parent_element."""
     origin = element.find("origin")
     words = {} if origin is None else origin.attrib
-    turned = arb_mat(3, 3, 1)
-    for k, angle in enumerate(numbers(words.get("rpy", "0 0 0"))):
-        (sine, cosine), one = arb(angle).sin_cos(), arb_mat(3, 3, 1)
-        i, j = (k + 1) % 3, (k + 2) % 3
-        one[i, i] = one[j, j] = cosine
-        one[i, j], one[j, i] = -sine, sine
-        turned = one * turned
-    rows = zip(turned.tolist(), numbers(words.get("xyz", "0 0 0")), strict=True)
-    return [*([*row, arb(shift)] for row, shift in rows), [0, 0, 0, 1]]
+    x, y, z = numbers(words.get("xyz", "0 0 0"))
+    place = arb_mat([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
+    angles = zip((X, Y, Z), numbers(words.get("rpy", "0 0 0")), strict=True)
+    for axis, angle in reversed([*angles]):
+        turn = Joint(0, TURNS, axis, place, (None, 1.0, angle))
+        place = turn.carries([])
+    return place
 
 
 class Model:
@@ -215,7 +213,7 @@ class Model:
     def solids(self, link: ET.Element, name: str, covers: Any) -> Iterator[Solid]:
         """The convex pieces of a link; of each mesh as the certificate has it."""
         for collision in link.findall("collision"):
-            *axes, shift = np.array(placed(collision), float)[:3].T
+            *axes, shift = np.array(placed(collision).tolist(), float)[:3].T
             for shape in collision.findall("geometry/*"):
                 if shape.tag == "mesh":
                     mesh = read_mesh(self._mesh(shape))

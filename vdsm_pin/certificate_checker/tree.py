@@ -42,7 +42,7 @@ class Joint:
         self.parent, self.kind = parent, kind
         self.column, self.ratio, self.offset = moves[0], *map(arb, moves[1:])
         self.gain, self.past = abs(moves[1]), UP * abs(moves[2])
-        self.placement = arb_mat([[*row] for row in placement])
+        self.placement = arb_mat(placement.tolist())
         self.lever = float(norm(point_of(self.placement, 0, 0, 0))) * UP
         x, y, z = unit(column(*map(float, axis))).entries()
         twist: Any = [[0, 0, 0, x], [0, 0, 0, y], [0, 0, 0, z], [0] * 4]
