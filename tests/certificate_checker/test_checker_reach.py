@@ -108,7 +108,8 @@ def test_bounds_lie_above_what_rounding_loses_of_them() -> None:
         value, moved, tilt, offset = rng.uniform(0.1, 1.0, 4)
         made = Joint(0, kind, axis, place, (0, -2.0, offset), (value, moved, tilt))
         assert arb(made.lever) > exact(place[:3, 3])
-        assert made.past > offset
+        still = Joint(0, kind, axis, place, (None, 1.0, offset))
+        assert still.bounds(None)[0, 0] > offset
         assert made.tilt > tilt
         assert made.turn_error > value if kind == TURNS else made.turn_error == 0.0
         least = arb(moved) + (arb(value) if kind == SLIDES else 0)

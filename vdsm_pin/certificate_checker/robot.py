@@ -188,7 +188,8 @@ class Model:
         self.joints[0].err(0.0, *stated["base"])
         for joint in self.joints:
             if joint.column is not None:
-                joint.err(joint.gain * values[self.moved[joint.column].name], 0.0, 0.0)
+                value = values[self.moved[joint.column].name]
+                joint.err(abs(joint.ratio) * value, 0.0, 0.0)
 
     def _mesh(self, mesh: ET.Element) -> Any:
         name = mesh.attrib["filename"]

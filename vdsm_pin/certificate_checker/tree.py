@@ -5,6 +5,7 @@ is the world. How a frame stands is a matrix of shape (4, 4).
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ Pose: TypeAlias = list[arb_mat]  # T_world_frame of every frame
 FIXED, TURNS, SLIDES = "FIXED", "REVOLUTE", "PRISMATIC"
 
 
+@dataclass(eq=False)
 class Joint:
     """A joint: its place in the frame that it hangs on, and how it moves.
 
@@ -30,29 +32,27 @@ class Joint:
         errors: Of its value, and a shift and a turn of its placement; [rad] or [m].
     """
 
-    def __init__(
-        self,
-        parent: int,
-        kind: str,
-        axis: Any,
-        placement: Any,
-        moves: tuple[int | None, float, float],
-        errors: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    ) -> None:
-        self.parent, self.kind = parent, kind
-        self.column, self.ratio, self.offset = moves[0], *map(arb, moves[1:])
-        self.gain, self.past = abs(moves[1]), UP * abs(moves[2])
-        self.placement = arb_mat(placement.tolist())
+    parent: int
+    kind: str
+    axis: Any
+    placement: Any
+    moves: tuple[int | None, float, float]
+    errors: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Work out what every pose and bound needs."""
+        self.column, self.ratio, self.offset = self.moves
+        self.placement = arb_mat(self.placement.tolist())
         self.lever = float(norm(point_of(self.placement, 0, 0, 0))) * UP
-        x, y, z = unit(column(*map(float, axis))).entries()
+        x, y, z = unit(column(*map(float, self.axis))).entries()
         twist: Any = [[0, 0, 0, x], [0, 0, 0, y], [0, 0, 0, z], [0] * 4]
-        if kind == TURNS:
+        if self.kind == TURNS:
             twist = [[0, -z, y, 0], [z, 0, -x, 0], [-y, x, 0, 0], [0] * 4]
         self.first = self.placement * arb_mat(twist)
         self.second = self.first * arb_mat(twist)
         line = self.placement * arb_mat([[0, x], [0, y], [0, z], [1, 0]])
         self.line = np.array(line.tolist()[:3], float)  # where it stands, and its axis
-        self.err(*errors)
+        self.err(*self.errors)
 
     def err(self, value: float, moved: float, tilt: float) -> None:
         """Take other errors."""
@@ -61,9 +61,9 @@ class Joint:
         self.erring = np.array([[0.0], [0.0], [angle], [angle + self.tilt]])
         self.slip = moved + (value if self.kind == SLIDES else 0.0)
 
-    def carries(self, q: Sequence[arb]) -> arb_mat:
+    def carries(self, q: Sequence[arb]) -> Any:
         """T_parent_frame at a row of q: by the exponential of its twist."""
-        value = self.offset
+        value = arb(self.offset)
         if self.column is not None:
             value = self.ratio * q[self.column] + value
         if self.kind == FIXED:
@@ -79,10 +79,10 @@ class Joint:
         Args:
             columns: Those of the columns of q, shape (n_columns, 3, n).
         """
-        found = np.array([[self.past], [0.0], [0.0]])
-        return (
-            found if self.column is None else found + self.gain * columns[self.column]
-        )
+        found = np.array([[UP * abs(self.offset)], [0.0], [0.0]])
+        if self.column is not None:
+            found = found + abs(self.ratio) * columns[self.column]
+        return found
 
 
 def point_of(frame: arb_mat, x: Any, y: Any, z: Any) -> arb_mat:
@@ -95,14 +95,12 @@ def frame_of(link: int) -> int:
     return 2 * link + 1
 
 
-def hung(one: Any, base: int, columns: int) -> Any:
+def hung(one: Any, base: int, columns: int) -> Joint:
     """A joint, as a reader gives it too, behind so many others and columns of q."""
-    if not isinstance(one, Joint):
-        moves = one.column, one.ratio, one.offset
-        one = Joint(one.parent, one.kind.name, one.axis, one.placement, moves)
-    one.parent += base if one.parent else 0
-    one.column = None if one.column is None else one.column + columns
-    return one
+    parent, column = one.parent and one.parent + base, one.column
+    moves = None if column is None else column + columns, one.ratio, one.offset
+    kind = one.kind if isinstance(one, Joint) else one.kind.name
+    return Joint(parent, kind, one.axis, one.placement, moves)
 
 
 class Tree:
