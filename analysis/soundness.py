@@ -45,8 +45,14 @@ from oracles.adversarial import (
 from oracles.adversarial_bodies import pack
 from oracles.adversarial_boxes import Boxed, attacked, make_boxed
 from oracles.adversarial_truth import exact_bracket
+from oracles.tree_queries import (
+    TreeQuery,
+    clearances,
+    make_query,
+    random_box,
+    wrong_poses,
+)
 from oracles.tree_queries import at as tree_rows
-from oracles.tree_queries import clearances, make_query, random_box, wrong_poses
 
 import vdsm_pin
 from vdsm_pin.arm.bodies import arm_bodies
@@ -63,9 +69,11 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.bodies import ErrorBox as ProofBox
 from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.packing import pack_task, with_errors
+from vdsm_pin.proof.parts import PartPlan
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import prove
+from vdsm_pin.proof.proofs import Proof
 from vdsm_pin.proof.proving import new_proving
+from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.verification.asked_motion import AskedMotion
 from vdsm_pin.verification.brackets import ClearanceChunk
@@ -165,7 +173,8 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     surfaces[: len(obstacles)] = errors.obstacle
     task = with_errors(task, ProofBox(joints, shifts, tilts, surfaces))
     # No obstacle is named as such, so that none is settled by its box.
-    proving = new_proving(task, path.packed(), 1, 0, BUDGET)
+    plan = PartPlan(bodies, table, np.arange(n), own, np.arange(len(bodies)), 0)
+    proving = new_proving(plan, task, path.packed(), 1, BUDGET)
     proving.sweep(0, 1)
     return proving.results.counts.argmax(axis=1)
 
@@ -297,6 +306,12 @@ def judge(batch: Batch, rng: np.random.Generator, tally: Counter[str]) -> None:
         tally["scenes judged whole"] += 1
 
 
+def _proof(query: TreeQuery, pair: Pair, errors: ProofBox | None = None) -> Proof:
+    """Of the two bodies of a query."""
+    asked = Question.of(query.tree, query.bodies, PairTable.of([pair]), errors)
+    return asked.about(query.path).prove()
+
+
 def judge_tree(rng: np.random.Generator, motion: str, tally: Counter[str]) -> None:
     """Judge a query about two bodies of a random tree: missed, kept, with errors.
 
@@ -307,11 +322,10 @@ def judge_tree(rng: np.random.Generator, motion: str, tally: Counter[str]) -> No
     """
     query = make_query(rng, TREES[motion], int(rng.integers(1, MOST_JOINTS + 1)))
     off = float(10.0 ** rng.uniform(-9.0, -3.0))
-    args = query.tree, query.bodies, query.path
     for limit in (query.nearest + off, query.nearest - off):
         required = max(0.0, limit)
         missing = required - query.nearest
-        proof = prove(*args, [Pair(*rng.permutation(2).tolist(), required)])
+        proof = _proof(query, Pair(*rng.permutation(2).tolist(), required))
         met = np.array([proof.share[0]])
         poses = query.tree.poses(tree_rows(query.path, met))
         nearest = clearances(query.tree, query.bodies, poses)[0]
@@ -322,7 +336,7 @@ def judge_tree(rng: np.random.Generator, motion: str, tally: Counter[str]) -> No
         )
         _count(motion, np.array([query.shape]), truth, proof.verdict, tally)
     box, required = random_box(rng, query.tree), max(0.0, query.nearest - 10.0 * off)
-    proof = prove(*args, [Pair(0, 1, required)], box)
+    proof = _proof(query, Pair(0, 1, required), box)
     wrong = False
     for t in rng.uniform(size=ATTACKS if proof.is_certified else 0):
         row = tree_rows(query.path, np.array([t]))[0]

@@ -32,9 +32,10 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.paths import Path as JointPath
-from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.proofs import Proof
+from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.tree import Joint, Kind, Tree, shifted
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 
@@ -264,17 +265,18 @@ def tree_of_hulls(n_intervals: int = 10_000) -> tuple[Any, ...]:
 
 def robot(repeat: int = 20) -> Row:
     """A robot's tree: 10,000 intervals, 72 pairs with boxes and 6 of its own."""
-    asked, proofs = tree_of_hulls(), list[Proof]()
+    (tree, bodies, path, pairs), proofs = tree_of_hulls(), list[Proof]()
 
     def judge() -> None:
-        proofs[:] = [prove(*asked)]
+        question = Question.of(tree, bodies, PairTable.of(pairs))
+        proofs[:] = [question.about(path).prove()]
 
     seconds, (proof,) = timed(judge, repeat), proofs
     return Row(
         table="robot",
         size=6,
-        intervals=asked[2].n_intervals,
-        pairs=len(asked[3]),
+        intervals=path.n_intervals,
+        pairs=len(pairs),
         triangles=0,
         clearance_mm=float(proof.upper.min()) / MM,
         not_certified=int(proof.counts[:, 1:].sum()),

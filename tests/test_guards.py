@@ -98,7 +98,7 @@ def planned() -> Trajectory:
 
 def test_the_proof_of_a_plan_needs_few_subdivisions(planned: Trajectory) -> None:
     proving = AskedMotion.of_arm(near(), planned, ErrorBox()).proving()
-    proving.run()
+    proving.prove()
     results = proving.results
     assert results.tally[SLICES] <= 0.01 * results.counts.sum()
 

@@ -6,10 +6,10 @@ from pathlib import Path as File
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.proof.bodies import Body, ErrorBox, PairTable
+from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.parts import PartPlan
 from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.proofs import Proof
 from vdsm_pin.proof.proving import Proving
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.tree import Tree
@@ -22,14 +22,27 @@ def start_proof(
     tree: Tree,
     bodies: Sequence[Body],
     path: Path,
-    pairs: PairTable,
+    pairs: Sequence[Pair] | PairTable,
     errors: ErrorBox | None = None,
     budget: Budget | None = None,
     columns: IntArray | None = None,
-) -> tuple[Proving, PartPlan]:
-    """Everything ready, nothing judged; arguments as for `prove`."""
-    asked = Question.of(tree, bodies, pairs, errors, columns)
-    return asked.about(path, budget), asked.plan
+) -> Proving:
+    """Everything ready, nothing judged."""
+    table = pairs if isinstance(pairs, PairTable) else PairTable.of(pairs)
+    return Question.of(tree, bodies, table, errors, columns).about(path, budget)
+
+
+def prove(
+    tree: Tree,
+    bodies: Sequence[Body],
+    path: Path,
+    pairs: Sequence[Pair] | PairTable,
+    errors: ErrorBox | None = None,
+    budget: Budget | None = None,
+    columns: IntArray | None = None,
+) -> Proof:
+    """All of it judged."""
+    return start_proof(tree, bodies, path, pairs, errors, budget, columns).prove()
 
 
 def read_scene(path: File, robot_size: float) -> Scene:

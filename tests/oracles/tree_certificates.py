@@ -71,8 +71,8 @@ class Core:
 def proofs_of(query: TreeQuery, box: ErrorBox, required: float) -> list[Any] | None:
     """The proof of each interval by the prover, None where it finds none."""
     table = PairTable.of([Asked(1, 0, required)])
-    made, plan = start_proof(query.tree, query.bodies, query.path, table, box)
-    if not plan.swapped.all():  # the first body is to be the one that moves
+    made = start_proof(query.tree, query.bodies, query.path, table, box)
+    if not made.plan.swapped.all():  # the first body is to be the one that moves
         return None
     records = np.zeros((ROOM, RECORD))
     n = query.path.n_intervals

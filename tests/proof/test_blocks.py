@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from oracles.plain import plain
-from oracles.shortcuts import start_proof
+from oracles.shortcuts import prove, start_proof
 from oracles.tree_queries import random_path, random_tree, unit
 
 from vdsm_pin.geometry.arrays import FloatArray
@@ -27,7 +27,6 @@ from vdsm_pin.proof.plane_bounds import (
     place_own,
     take_disc,
 )
-from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import dense_rows
 from vdsm_pin.proof.results import count_the_rest
 from vdsm_pin.proof.row_places import fill_rows
@@ -386,7 +385,7 @@ def test_how_much_is_judged_is_told_while_it_is() -> None:
         [ball(1, 0.0), ball(0, 2.0), ball(0, 3.0)],
         PairTable.of([Pair(0, 1), Pair(0, 2)]),
     )
-    proving, _ = start_proof(tree, bodies, path, table)
+    proving = start_proof(tree, bodies, path, table)
     assert (proving.n_intervals, proving.share) == (4 * BLOCK, 0.0)
     assert proving.new_results().profile.shape == proving.results.profile.shape
     proving.sweep(0, BLOCK)
@@ -405,7 +404,7 @@ def test_each_pair_owns_up_to_what_it_was_not_judged(judged: tuple[int, int]) ->
         [ball(1, 0.0), ball(0, 2.0), ball(0, 3.0)],
         PairTable.of([Pair(0, 1), Pair(0, 2)]),
     )
-    proving, _ = start_proof(tree, bodies, path, table)
+    proving = start_proof(tree, bodies, path, table)
     results = proving.results
     results.counts[:, CERTIFIED] = judged
     results.best[:, 0] = 1.0
@@ -417,8 +416,8 @@ def test_each_pair_owns_up_to_what_it_was_not_judged(judged: tuple[int, int]) ->
     assert (results.best[left == 0, 0] == 1.0).all()
     expected = -np.inf if left.any() else 1.0
     assert (results.profile[0] == expected).all()
-    over, _ = start_proof(tree, bodies, path, table, budget=Budget(until=0.0))
-    assert not over.run()
+    over = start_proof(tree, bodies, path, table, budget=Budget(until=0.0))
+    assert not over.prove().in_time
     assert (over.results.counts[:, UNDECIDED] == BLOCK).all()
     assert (over.results.best[:, 0] == -np.inf).all()
 

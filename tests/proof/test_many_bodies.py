@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from oracles.shortcuts import start_proof
+from oracles.shortcuts import prove, start_proof
 from oracles.tree_queries import (
     SHAPES,
     at,
@@ -24,7 +24,7 @@ from vdsm_pin.proof.blocks import run_sweep
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.broad_phase import FEW
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.proofs import Proof
 from vdsm_pin.proof.proving import dense_rows
 from vdsm_pin.proof.row_places import FEW_PLACES
 from vdsm_pin.proof.rows import BLOCK
@@ -146,11 +146,11 @@ def test_each_interval_is_bracketed_by_itself(seed: int) -> None:
     rng = np.random.default_rng([34, seed])
     tree, bodies, path = random_scene(rng)
     pairs, n = pairs_of(bodies), max(1, path.n_intervals)
-    made, plan = start_proof(tree, bodies, path, PairTable.of(pairs))
-    dense = dense_rows(n, len(plan.owner))
+    made = start_proof(tree, bodies, path, PairTable.of(pairs))
+    dense = dense_rows(n, len(made.plan.owner))
     results = made.new_results()._replace(dense=dense)
     assert made.fresh(results).sweep(0, n)
-    assert plan.owner.tolist() == list(range(len(pairs)))
+    assert made.plan.owner.tolist() == list(range(len(pairs)))
     for k in range(n):
         part = Path(path.knots[k : k + 2], path.inner[k : k + 1])
         for number, pair in enumerate(pairs):
@@ -181,7 +181,7 @@ def test_yes_or_no_is_what_the_bounds_say(seed: int, error: float) -> None:
 
     def answered(limits: dict[int, float]) -> bool:
         asked = [Pair(every[k].one, every[k].other, r) for k, r in limits.items()]
-        made, _ = start_proof(tree, bodies, path, PairTable.of(asked), box)
+        made = start_proof(tree, bodies, path, PairTable.of(asked), box)
         return bool(run_sweep(made.sweeping, (0, made.n_intervals), True))
 
     kept = {k: float(proof.lower[k]) - 1e-4 for k in apart}
@@ -204,7 +204,7 @@ def test_full_blocks_are_bracketed_row_by_row(seed: int, error: float) -> None:
         Pair(i, j) for i in range(len(kinds)) for j in (len(kinds), len(kinds) + 1)
     ]
     box = ErrorBox(*(np.full(len(tree.joints), e) for e in (error, 0.0, 0.0)))
-    made, _ = start_proof(tree, bodies, path, PairTable.of(pairs), box)
+    made = start_proof(tree, bodies, path, PairTable.of(pairs), box)
     dense = dense_rows(path.n_intervals, len(pairs))
     results = made.new_results()._replace(dense=dense)
     assert made.fresh(results).sweep(0, path.n_intervals)
@@ -240,8 +240,8 @@ def test_boxes_settle_all_that_is_far(seed: int) -> None:
         away = unit(rng) * (6.0 if k == near else rng.uniform(25.0, 40.0))
         bodies.append(Body(0, (Hull(away[None], 0.1),)))
     pairs = [Pair(i, j) for i in range(n_bodies) for j in range(n_bodies, len(bodies))]
-    made, _ = start_proof(tree, bodies, path, PairTable.of(pairs))
-    assert made.run()
+    made = start_proof(tree, bodies, path, PairTable.of(pairs))
+    assert made.prove().in_time
     settled = np.full((n_bodies, FEW + 2), path.n_intervals)
     settled[:, near] = 0
     assert np.array_equal(np.sort(made.broad.settled), np.sort(settled))
@@ -294,9 +294,9 @@ def test_generators_that_no_error_wrote_are_not_read(seed: int) -> None:
     n, found = len(tree.joints), []
     box = ErrorBox(rng.choice([0.0, 0.02], n), np.zeros(n), rng.choice([0.0, 0.02], n))
     for filling in (0.0, np.nan, 1e9):
-        made, _ = start_proof(tree, bodies, path, PairTable.of(pairs_of(bodies)), box)
+        made = start_proof(tree, bodies, path, PairTable.of(pairs_of(bodies)), box)
         made.work.space.body.swings[:] = filling
-        assert made.work.space.body.swings.size and made.run()
+        assert made.work.space.body.swings.size and made.prove().in_time
         found.append(made.results)
     for one in found[1:]:
         assert same_arrays(one, found[0], ["best", "counts", "limit", "tally"])

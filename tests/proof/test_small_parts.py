@@ -54,7 +54,7 @@ from vdsm_pin.proof.layouts import (
 from vdsm_pin.proof.packed_tree import pack_tree
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import RANK
+from vdsm_pin.proof.proofs import RANK
 from vdsm_pin.proof.proving import new_results, room_for
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import new_tracks

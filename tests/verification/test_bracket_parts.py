@@ -29,7 +29,7 @@ from vdsm_pin.proof.layouts import (
     RECORD,
 )
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import RANK
+from vdsm_pin.proof.proofs import RANK
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.time_limit import Deadline

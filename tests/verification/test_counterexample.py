@@ -17,7 +17,8 @@ from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.prover import verdicts_of
+from vdsm_pin.proof.proofs import verdicts_of
+from vdsm_pin.proof.proving import Proving
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.verification import clearances, counterexample
 from vdsm_pin.verification.asked_motion import AskedMotion
@@ -331,7 +332,7 @@ def test_a_configuration_is_judged_by_its_proof_or_a_ball_in_both(
         return radius, centre
 
     told = SimpleNamespace(verdict=[verdict], upper=[upper], points=[points])
-    monkeypatch.setattr(counterexample, "answer", lambda *_: told)
+    monkeypatch.setattr(Proving, "prove", lambda _: told)
     monkeypatch.setattr(counterexample, "common_ball", common_ball)
     offset = np.linspace(-0.01, 0.01, 17)
     offset[3] = -0.0

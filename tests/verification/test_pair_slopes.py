@@ -128,7 +128,7 @@ def test_slopes_of_a_cylinder_from_a_ball_are_those_of_the_closed_form(
     )
     bodies = Body(tree.n_frames - 1, (rod,)), Body(0, (Hull(centre[None], 0.05),))
     path = Path(np.zeros((1, tree.n_columns)))
-    task = start_proof(tree, bodies, path, PairTable.of([BodyPair(0, 1)]))[0].task
+    task = start_proof(tree, bodies, path, PairTable.of([BodyPair(0, 1)])).task
     q = rng.uniform(-1.0, 1.0, (40, tree.n_columns))
 
     def closed(q: FloatArray) -> FloatArray:

@@ -219,16 +219,17 @@ def test_the_pairs_left_open_that_are_nearest_are_searched(
     n, asked, swept = int(rng.integers(0, 9)), list[int](), list[tuple[int, int]]()
     counts, best = rng.integers(0, 2, (n, 3)), rng.normal(size=(n, BEST))
     errors = {k: None if rng.random() < 0.4 else rng.normal(size=17) for k in range(n)}
-    proving = SimpleNamespace(
-        n_intervals=7, results=SimpleNamespace(counts=counts),
-        sweep=lambda *interval: swept.append(interval),
-    )  # fmt: skip
     held = SimpleNamespace(pair=lambda k: k)
-    least = SimpleNamespace(lower=best[:, LOW], lower_interval=np.ones(n, int))
+    least = SimpleNamespace(
+        lower=best[:, LOW], lower_interval=np.ones(n, int), counts=counts
+    )
+    proving = SimpleNamespace(
+        n_intervals=7, sweep=lambda *interval: swept.append(interval),
+        found=lambda _: least,
+    )  # fmt: skip
     motion = SimpleNamespace(
         asked=held,
         proving=lambda _: proving,
-        told=lambda _: least,
         knots=SimpleNamespace(interval=lambda inner: inner),
     )
 

@@ -88,6 +88,11 @@ class PartPlan:
     number: IntArray
     n_obstacles: int
 
+    @property
+    def n_pairs(self) -> int:
+        """Number of pairs as they were given."""
+        return int(self.owner.max(initial=-1)) + 1
+
 
 def planned_parts(tree: Tree, bodies: Sequence[Body], pairs: PairTable) -> PartPlan:
     """Which side of each pair moves, and its convex parts.

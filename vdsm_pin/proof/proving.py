@@ -1,4 +1,7 @@
-"""A proof at work: what is asked, its working space, where it writes."""
+"""A proof at work: what is asked, its working space, where it writes.
+
+`Proving.prove` is the one way to a proof, whoever asks.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -10,6 +13,8 @@ from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.far_pairs import BroadPhase, new_broad_phase
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
 from vdsm_pin.proof.motions import Motion
+from vdsm_pin.proof.parts import PartPlan
+from vdsm_pin.proof.proofs import Proof, summed
 from vdsm_pin.proof.results import Candidates, Dense, Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.sweep import Sweep
@@ -69,8 +74,13 @@ def dense_rows(size: int, n_pairs: int) -> Dense:
 
 @dataclass(frozen=True)
 class Proving:
-    """One question and motion, and the working space of their proof."""
+    """One question and motion, and the working space of their proof.
 
+    What was proved so far stays: planes that served are tried first when stretches or
+    other errors are asked next.
+    """
+
+    plan: PartPlan
     task: Task
     motion: Motion
     work: Workspace
@@ -85,7 +95,7 @@ class Proving:
 
     @property
     def n_pairs(self) -> int:
-        """Number of pairs."""
+        """Number of pairs, each part of a body with several by itself."""
         return len(self.results.best)
 
     @property
@@ -105,20 +115,22 @@ class Proving:
         """Judge some intervals; whether there was time for all."""
         return bool(run_sweep(self.sweeping, (first, last), False))
 
-    def run(self) -> bool:
-        """Judge all intervals, narrow the least brackets, place the witnesses.
+    def prove(self) -> Proof:
+        """Bracket the clearance of every pair over the whole path.
 
         Returns:
-            Whether there was time to judge all; what is not judged is undecided.
+            The proof, its least brackets narrowed unless the time ended before; what
+            is not judged is undecided.
         """
-        return self._judge((0, self.n_intervals), True)
+        return self.found(bool(judge(self.sweeping, (0, self.n_intervals), True)))
 
-    def judge(self, first: int, last: int) -> bool:
+    def judge(self, first: int, last: int) -> Proof:
         """The same of some intervals, no bracket narrowed."""
-        return self._judge((first, last), False)
+        return self.found(bool(judge(self.sweeping, (first, last), False)))
 
-    def _judge(self, span: tuple[int, int], narrowing: bool) -> bool:
-        return bool(judge(self.sweeping, span, narrowing))
+    def found(self, in_time: bool) -> Proof:
+        """What was proved so far."""
+        return summed(self.results, self.plan, in_time)
 
     def new_results(self) -> Results:
         """Where to write what is asked again."""
@@ -132,16 +144,15 @@ class Proving:
 
 
 def new_proving(
-    task: Task, motion: Motion, columns: int, n_obstacles: int, budget: Budget
+    plan: PartPlan, task: Task, motion: Motion, columns: int, budget: Budget
 ) -> Proving:
     """Everything ready, nothing judged.
 
     Args:
+        plan: How the pairs are asked.
         task: What is asked.
         motion: The motion; one row counts as an interval without motion.
         columns: Columns of the profile.
-        n_obstacles: So many of the first obstacles of the packed scene rest in the
-            world.
         budget: Sizes.
     """
     pad, n_intervals = task.rules.pad, max(1, len(motion.knots) - 1)
@@ -149,6 +160,7 @@ def new_proving(
     padded = pad > 0.0 and bool((task.pairs.lost >= pad).all())
     assert padded, "the task is of no motion: see Question.about"
     return Proving(
+        plan=plan,
         task=task,
         motion=motion,
         work=new_workspace(
@@ -159,6 +171,6 @@ def new_proving(
             budget.candidates,
         ),
         results=new_results(len(task.pairs.rough), columns, n_intervals, budget),
-        broad=new_broad_phase(task, n_obstacles),
+        broad=new_broad_phase(task, plan.n_obstacles),
         budget=budget,
     )

@@ -1,4 +1,8 @@
-"""What is asked of every motion of a tree: bodies and pairs, packed once."""
+"""What is asked of every motion of a tree: bodies and pairs, packed once.
+
+`Question.of(tree, bodies, pairs, errors).about(path, budget).prove()` is the
+whole proof.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +33,6 @@ class Question:
     Args:
         tree: The joints.
         plan: How the pairs are asked.
-        n_pairs: Their number.
         task: The same as compiled code reads it, of no motion: without errors and
             rounding, so that nothing may be proved of it.
         number: The body as it was given that each packed one is or is a part of.
@@ -40,7 +43,6 @@ class Question:
 
     tree: Tree
     plan: PartPlan
-    n_pairs: int
     task: Task
     number: IntArray
     errors: ErrorBox
@@ -57,10 +59,17 @@ class Question:
         columns: IntArray | None = None,
         packed: PackedPieces | None = None,
     ) -> "Question":
-        """Pack it; arguments as for `prove`.
+        """Pack it.
 
-        `packed` has the pieces of the bodies, those at rest first, where they are
-        packed already; of bodies with rough versions or parts it is of no use.
+        Args:
+            tree: The joints; what moves by itself is a branch of its own.
+            bodies: The bodies, on its frames.
+            pairs: Which bodies are held apart, and how far.
+            errors: The proof covers every motion within them; None for the path itself.
+            columns: Column of each body in the profile, shape (n_bodies,); the profile
+                is of moving bodies against those at rest. None for no profile.
+            packed: Pieces of the bodies, those at rest first, where they are packed
+                already; of bodies with rough versions or parts it is of no use.
 
         Raises:
             ValueError: If bodies, pairs and tree do not fit together.
@@ -78,7 +87,7 @@ class Question:
         extent, rules = _extent(tree, packed), Budget().rules(0.0)
         task = pack_task(tree, every, rough.pairs, rules, None, columns, packed)
         none = ErrorBox(*np.zeros((3, len(tree.joints))))
-        asked = cls(tree, plan, pairs.size, task, number, none, count, extent)
+        asked = cls(tree, plan, task, number, none, count, extent)
         return asked if errors is None else asked.under(errors)
 
     def under(self, errors: ErrorBox) -> "Question":
@@ -98,6 +107,10 @@ class Question:
     def about(self, path: Path, budget: Budget | None = None) -> Proving:
         """The question about a motion, nothing judged.
 
+        Args:
+            path: How the joints move.
+            budget: How long it may take.
+
         Raises:
             ValueError: If the path has other columns than the tree.
         """
@@ -110,8 +123,7 @@ class Question:
         reach = path.reach
         rules = budget.rules(rounding_pad(self.extent + added_up(tree.joints, reach)))
         task = for_motion(self.task, tree, reach, rules, self.errors)
-        motion, n_obstacles = path.packed(), self.plan.n_obstacles
-        return new_proving(task, motion, self.n_columns, n_obstacles, budget)
+        return new_proving(self.plan, task, path.packed(), self.n_columns, budget)
 
 
 @lru_cache(maxsize=KEPT)

@@ -28,8 +28,8 @@ from vdsm_pin.proof.layouts import (
     UP,
 )
 from vdsm_pin.proof.motions import Motion
+from vdsm_pin.proof.proofs import Proof, summed
 from vdsm_pin.proof.proving import Proving, dense_rows
-from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.search import Slicing, new_witness, resolve
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.witnesses import place_witness
@@ -51,25 +51,21 @@ class Stretches:
     def __init__(self, proving: Proving, pairs: IntArray) -> None:
         self._proving, self._pairs = proving, pairs
 
-    def over(self, low: float, high: float) -> tuple[Results, bool]:
+    def over(self, low: float, high: float) -> Proof:
         """What is proved of every pair between two moments, no bracket narrowed.
 
         Args:
             low: In knots of the path, as 1.25 is a quarter of the way from 1 to 2.
             high: Not before; both may be one moment.
-
-        Returns:
-            The results, and whether there was time for all.
         """
         proving = self._proving
         results = proving.new_results()
         if low == floor(low) < high == floor(high):
-            fresh = proving.fresh(results)
-            return results, fresh.judge(int(low), int(high))
+            return proving.fresh(results).judge(int(low), int(high))
         slices = _slices(low, high, proving.n_intervals)
         asked = proving.task, proving.motion, proving.work, self._pairs
         _judge_slices(*asked, results.best, results.counts, slices)
-        return results, True
+        return summed(results, proving.plan, True)
 
     def each(self) -> tuple[IntArray, FloatArray] | None:
         """What is proved of every interval by itself.

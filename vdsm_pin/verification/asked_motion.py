@@ -11,10 +11,8 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import Proof, answer, summed
 from vdsm_pin.proof.proving import Proving
 from vdsm_pin.proof.question import Question
-from vdsm_pin.proof.results import Results
 from vdsm_pin.verification.assembly import Assembly
 from vdsm_pin.verification.moving import Knots, in_short_parts, joined_path
 from vdsm_pin.verification.task import arm_assembly
@@ -95,11 +93,3 @@ class AskedMotion:
     def proving(self, budget: Budget = BUDGET) -> Proving:
         """A proof that is ready to run; nothing is judged yet."""
         return self.question.about(self.path, budget)
-
-    def told(self, results: Results, *, in_time: bool = True) -> Proof:
-        """What was proved so far, in intervals of the path."""
-        return summed(results, self.question.plan, self.asked.table.size, in_time)
-
-    def proof(self, budget: Budget = BUDGET) -> Proof:
-        """All of it proved, as far as there is time."""
-        return answer(self.question, self.path, budget)

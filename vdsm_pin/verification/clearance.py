@@ -20,7 +20,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import LOW, TALLY
-from vdsm_pin.proof.prover import RANK
+from vdsm_pin.proof.proofs import RANK
 from vdsm_pin.proof.proving import Proving, dense_rows, room_for
 from vdsm_pin.proof.results import Dense
 from vdsm_pin.proof.rows import BLOCK
@@ -189,10 +189,9 @@ def prove_motion(
         The proof, its least brackets narrowed unless the time ended before.
     """
     asked, proving = motion.asked, motion.proving(budget)
-    step("proving the clearance of %d pairs", motion.question.n_pairs)
+    step("proving the clearance of %d pairs", asked.table.size)
     with watched(lambda: proving.share):
-        in_time = proving.run()
-    told = motion.told(proving.results, in_time=in_time)
+        told = proving.prove()
     sent = _send(motion, proving, sinks, reach) if sinks else 0
     n_links = max(asked.links, default=0)
     return ClearanceProof(
@@ -201,7 +200,7 @@ def prove_motion(
         on_path=least_clearances(asked, told),
         weakest_on_path=told.lower_interval,
         profile=profile_of(told.profile, told.stride, motion.knots, n_links),
-        late=not in_time,
+        late=not told.in_time,
         sent=sent,
     )
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.proof.prover import Proof
+from vdsm_pin.proof.proofs import Proof
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.asked_motion import AskedMotion

@@ -17,7 +17,6 @@ from vdsm_pin.problem.error_boxes import NO_ERRORS, ErrorBox
 from vdsm_pin.proof.bodies import Pair as ProofPair
 from vdsm_pin.proof.bodies import PairTable
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import answer
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import Deadline
@@ -176,7 +175,7 @@ class Search:
     def _judged(self, moment: Moment, offset: FloatArray) -> Counterexample | None:
         """What the clearance proof says of one configuration."""
         asked, q = self.motion.asked, self._joints(moment) + offset
-        proof = answer(self.question, Path(q[None]))
+        proof = self.question.about(Path(q[None])).prove()
         upper, points = float(proof.upper[0]), proof.points[0]
         refuted = proof.verdict[0] == REFUTED
         if not refuted and upper <= self.limit:

@@ -268,8 +268,8 @@ class _Judge:
         self._deadline.check()
         motion = self._motion
         span = motion.knots.inner(np.array([low, high]))
-        results, _ = self._stretches.over(*span.tolist())
-        least = least_clearances(motion.asked, motion.told(results))
+        found = self._stretches.over(*span.tolist())
+        least = least_clearances(motion.asked, found)
         return with_depths(motion, least, ENOUGH, span, self._deadline)
 
     def noted(self) -> Noted | None:
@@ -295,6 +295,6 @@ class _Judge:
 
     def _by_pair(self, parts: BoolArray) -> BoolArray:
         """Whether it is so of any part of each pair, of each interval."""
-        owner, n_pairs = self._motion.question.plan.owner, self._motion.asked.table.size
-        first = np.searchsorted(owner, np.arange(n_pairs))
+        plan = self._motion.question.plan
+        first = np.searchsorted(plan.owner, np.arange(plan.n_pairs))
         return np.asarray(np.logical_or.reduceat(parts, first, axis=1))

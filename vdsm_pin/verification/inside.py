@@ -22,7 +22,6 @@ from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.proof.bodies import PairTable
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.prover import answer
 from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -135,7 +134,7 @@ def located(motion: AskedMotion, deadline: Deadline = NO_LIMIT) -> dict[int, Pla
     if not unknown:
         return found
     asked = question_of_hulls(motion, unknown, unknown)
-    proof = answer(asked, motion.path, Budget(until=deadline.end))
+    proof = asked.about(motion.path, Budget(until=deadline.end)).prove()
     late = "" if proof.in_time else f"; {OutOfTime(deadline.limit)}"
     for k, verdict in zip(unknown, proof.verdict.tolist(), strict=True):
         where = found[k].where

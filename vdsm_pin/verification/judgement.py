@@ -205,7 +205,7 @@ def _is_deepest(
 
 def _is_clear(motion: AskedMotion, deadline: Deadline) -> bool:
     """Whether a motion is proved clear of everything."""
-    proof = motion.proof(Budget(until=deadline.end))
+    proof = motion.proving(Budget(until=deadline.end)).prove()
     return proof.is_certified and is_outside(located(motion, deadline))
 
 

@@ -279,9 +279,8 @@ def _smallest(
     budget = Budget(slices=LOOKS, profile=1, until=deadline.end)
     motion = AskedMotion.of_arm(problem, trajectory, errors)
     proving, knots = motion.proving(budget), motion.knots
-    proving.sweep(0, proving.n_intervals)
-    told, counts = motion.told(proving.results), proving.results.counts
-    among = np.flatnonzero(counts[:, UNDECIDED] > 0)
+    told = proving.found(proving.sweep(0, proving.n_intervals))
+    among = np.flatnonzero(told.counts[:, UNDECIDED] > 0)
     nearest = among[np.argsort(told.lower[among], kind="stable")][:SOUGHT]
     least = in_rows(least_clearances(motion.asked, told), knots)
     weakest = knots.interval(told.lower_interval)

@@ -1,26 +1,15 @@
-"""One proof for everything that moves.
+"""What was proved of each pair, and how it is summed up."""
 
-If the verdict of a pair is CERTIFIED, then at every instant of the path and for every
-motion within the error box its two bodies keep their required clearance, rounding
-included. If it is REFUTED, two points, one of each body, come nearer at a stated time.
-"""
-
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.proof.bodies import Body, ErrorBox, Pair, PairTable
-from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OWN, TIME, UP
 from vdsm_pin.proof.parts import PartPlan
-from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
-from vdsm_pin.proof.tree import Tree
 
 RANK: Final = np.array([0, 2, 1])
 """Of verdicts, the worst last: refuted, before it undecided; its own inverse."""
@@ -67,44 +56,6 @@ class Proof:
         return bool(self.verdict.size and (self.verdict == CERTIFIED).all())
 
 
-def prove(
-    tree: Tree,
-    bodies: Sequence[Body],
-    path: Path,
-    pairs: Sequence[Pair] | PairTable,
-    errors: ErrorBox | None = None,
-    budget: Budget | None = None,
-    columns: IntArray | None = None,
-) -> Proof:
-    """Bracket the clearance of every pair over the whole path.
-
-    Args:
-        tree: The joints; what moves by itself is a branch of its own.
-        bodies: The bodies, on its frames.
-        path: How the joints move.
-        pairs: Which bodies are held apart, and how far.
-        errors: The proof covers every motion within it; None for the path itself.
-        budget: How long it may take.
-        columns: Column of each body in the profile, shape (n_bodies,); the profile is
-            of moving bodies against those at rest. None for no profile.
-
-    Returns:
-        The proof, its least brackets narrowed unless the time ended before.
-
-    Raises:
-        ValueError: If bodies, pairs, path and tree do not fit together.
-    """
-    table = pairs if isinstance(pairs, PairTable) else PairTable.of(pairs)
-    return answer(Question.of(tree, bodies, table, errors, columns), path, budget)
-
-
-def answer(question: Question, path: Path, budget: Budget | None = None) -> Proof:
-    """`prove` of what is packed already."""
-    proving = question.about(path, budget)
-    in_time = proving.run()
-    return summed(proving.results, question.plan, question.n_pairs, in_time)
-
-
 def verdicts_of(counts: IntArray) -> IntArray:
     """Of each pair the worst, by how often it has each one, shape (n_pairs, 3)."""
     found = np.where(counts[:, UNDECIDED] > 0, UNDECIDED, CERTIFIED)
@@ -112,9 +63,9 @@ def verdicts_of(counts: IntArray) -> IntArray:
     return frozen(found, np.int64)
 
 
-def summed(results: Results, plan: PartPlan, n: int, in_time: bool) -> Proof:
-    """What was proved of the parts of n pairs, summed up by pair."""
-    best, owner = results.best, plan.owner
+def summed(results: Results, plan: PartPlan, in_time: bool) -> Proof:
+    """What was proved of the parts of all pairs, summed up by pair."""
+    best, owner, n = results.best, plan.owner, plan.n_pairs
     judged, least = results.counts, np.arange(n)
     met = least
     if len(owner) > n:  # pairs of several parts
