@@ -80,9 +80,8 @@ class Arm:
         rates = [x for x in (rows.rates, rows.changes) if x is not None]
         own = Branch(rows.joints, rows.times, rates=rates)
         self.own = Tree(joints), Path(own)
-        self.tree, self.path, frames = beside(own, joints, problem.scene.obstacles)
-        every = zip(frames, self.solids, lost, strict=True)
-        self.obstacles = [Body(*one) for one in every]
+        self.tree, self.path, at = beside(own, joints, problem.scene.obstacles)
+        self.obstacles = [Body(*x) for x in zip(at, self.solids, lost, strict=True)]
         self._cover(header)
         self.pairs = [*self._pairs()]
         self.rows = Rows(self, rows)

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.certificate_checker.balls import MM, claim, number
-from vdsm_pin.certificate_checker.motion import Interval, Path, Slices
+from vdsm_pin.certificate_checker.motion import Interval, Path, Slice, Slices
 from vdsm_pin.certificate_checker.solids import Pair
 from vdsm_pin.certificate_checker.tree import Pose, Tree
 
@@ -21,7 +21,7 @@ class Plane(NamedTuple):
     """A plane of a line: where, over what, for which pieces, normal and clearance."""
 
     place: str
-    slice: tuple[Interval, float, float]
+    slice: Slice
     first: int
     last: int
     n: tuple[float, float, float]

@@ -221,6 +221,9 @@ class Interval:
         return bounds
 
 
+Slice: TypeAlias = tuple[Interval, float, float]  # times a and b in it
+
+
 class Slices:
     """Slices of intervals, as arrays with one entry for each.
 
@@ -229,9 +232,7 @@ class Slices:
         slices: Each an interval, and times a and b in it.
     """
 
-    def __init__(
-        self, tree: Tree, slices: Sequence[tuple[Interval, float, float]]
-    ) -> None:
+    def __init__(self, tree: Tree, slices: Sequence[Slice]) -> None:
         self.tree, self.slices = tree, slices
         self.numbers = {one: i for i, one in enumerate(slices)}
         self.widths = np.array([b - a for _, a, b in slices])

@@ -74,7 +74,7 @@ def placed(element: ET.Element) -> arb_mat:
     x, y, z = numbers(words.get("xyz", "0 0 0"))
     place = arb_mat([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
     angles = zip((X, Y, Z), numbers(words.get("rpy", "0 0 0")), strict=True)
-    for axis, angle in reversed([*angles]):
+    for axis, angle in reversed([one for one in angles if one[1]]):
         turn = Joint(0, TURNS, axis, place, (None, 1.0, angle))
         place = turn.carries([])
     return place
@@ -189,7 +189,7 @@ class Model:
         for joint in self.joints:
             if joint.column is not None:
                 value = values[self.moved[joint.column].name]
-                joint.err(abs(joint.ratio) * value, 0.0, 0.0)
+                joint.err(abs(float(joint.ratio)) * value, 0.0, 0.0)
 
     def _mesh(self, mesh: ET.Element) -> Any:
         name = mesh.attrib["filename"]

@@ -36,12 +36,12 @@ class Joint:
     kind: str
     axis: Any
     placement: Any
-    moves: tuple[int | None, float, float]
+    moves: tuple[int | None, Any, Any]
     errors: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Work out what every pose and bound needs."""
-        self.column, self.ratio, self.offset = self.moves
+        self.column, self.ratio, self.offset = self.moves[0], *map(arb, self.moves[1:])
         self.placement = arb_mat(self.placement.tolist())
         self.lever = float(norm(point_of(self.placement, 0, 0, 0))) * UP
         x, y, z = unit(column(*map(float, self.axis))).entries()
@@ -63,7 +63,7 @@ class Joint:
 
     def carries(self, q: Sequence[arb]) -> Any:
         """T_parent_frame at a row of q: by the exponential of its twist."""
-        value = arb(self.offset)
+        value = self.offset
         if self.column is not None:
             value = self.ratio * q[self.column] + value
         if self.kind == FIXED:
@@ -79,9 +79,9 @@ class Joint:
         Args:
             columns: Those of the columns of q, shape (n_columns, 3, n).
         """
-        found = np.array([[UP * abs(self.offset)], [0.0], [0.0]])
+        found = np.array([[UP * abs(float(self.offset))], [0.0], [0.0]])
         if self.column is not None:
-            found = found + abs(self.ratio) * columns[self.column]
+            found = found + abs(float(self.ratio)) * columns[self.column]
         return found
 
 
