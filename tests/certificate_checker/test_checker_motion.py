@@ -187,8 +187,10 @@ def test_a_clearance_claimed_is_no_less_than_required(
 
 def test_lines_of_empty_lists_are_refused_before_they_are_read(tmp_path: Path) -> None:
     case = along(tmp_path, [0.0, 0.1])
-    case.certificate.write_bytes(b'{"a": [' + 5000 * b"[]," + b"[]]}\n")
-    assert refusal(case) == "header: a line is lists and no numbers"
+    for empty in (b"[]", b"{}"):
+        line = b'{"a": [' + 5000 * (empty + b",") + empty + b"]}\n"
+        case.certificate.write_bytes(line)
+        assert refusal(case) == "header: a line is lists and no numbers"
     # Seven bytes a list are enough, for any number of them.
     case.certificate.write_bytes(b'{"a": [' + 5000 * b"[1000]," + b"[]]}\n")
     assert "version" in refusal(case)

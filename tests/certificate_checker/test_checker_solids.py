@@ -135,7 +135,7 @@ def test_hulls_of_open_meshes_share_a_point_where_they_are_near(
     one, size = np.array([[0.0, 0, 0], [1, 0, 1], [0, 1, 1]]), np.sqrt(11.0)
     step = np.zeros(3)
     step[axis] = 1.0 + share * size / 1000  # the gaps make it no larger to speak of
-    corners = np.array([one + k * step for k in range(3)])[::sense]
+    corners = np.array([one + k * step for k in range(3)])[::sense] + 7.0  # far off
     groups = [[0], [1], [2]]
     tips = corners.mean(axis=1)
     tips = tips if share > 1.0 else np.tile(tips.mean(axis=0), (3, 1))
