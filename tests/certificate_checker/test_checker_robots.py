@@ -20,7 +20,8 @@ from oracles.random_robots import MESH, random_urdf
 from oracles.robot_certificates import BASES, CELL, VIRTUAL, Made, cell, text
 
 from vdsm_pin.certificate_checker.balls import SLACK, Rejected
-from vdsm_pin.certificate_checker.robot import Model, Robot, within
+from vdsm_pin.certificate_checker.robot import Model, Robot
+from vdsm_pin.certificate_checker.rows import within
 from vdsm_pin.certificate_checker.solids import Body
 from vdsm_pin.certificate_checker.tree import Tree
 from vdsm_pin.cli import main

@@ -56,11 +56,6 @@ def always(columns: Sequence[Points], good: Any, halvings: int = 20) -> bool:
     return all(always(each, good, halvings - 1) for each in parts)
 
 
-def keeps(points: Points, low: Any, high: Any) -> bool:
-    """Whether a column of q stays within limits all along."""
-    return always([points], lambda q: low <= q <= high)
-
-
 def raised(points: Points, degree: int) -> Points:
     """Control points of a higher degree, of the same polynomial."""
     while (n := len(points)) <= degree:

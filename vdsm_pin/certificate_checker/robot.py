@@ -4,25 +4,19 @@ The URDF is read here once more; joint 0 is fixed and holds the root link.
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping
 from itertools import combinations, product
 from pathlib import Path as File
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from flint import arb, arb_mat
+from flint import arb_mat
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
-from vdsm_pin.certificate_checker.balls import SLACK, belongs, claim
+from vdsm_pin.certificate_checker.balls import belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
-from vdsm_pin.certificate_checker.motion import (
-    Branch,
-    Path,
-    beside,
-    columns_of,
-    derivative,
-    keeps,
-)
+from vdsm_pin.certificate_checker.motion import Branch, beside
+from vdsm_pin.certificate_checker.rows import RobotRows
 from vdsm_pin.certificate_checker.solids import (
     CUBE,
     Body,
@@ -34,7 +28,7 @@ from vdsm_pin.certificate_checker.solids import (
     sizes,
     solid,
 )
-from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose, Tree
+from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Tree
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.others import OtherFile, Others
 from vdsm_pin.io.source import files_in, sha256_of_file
@@ -295,7 +289,6 @@ class Robot:
     judged = "clearances hold under the errors stated, limits and rates without them"
 
     def __init__(self, file: CellFile, header: Any, trajectory: File) -> None:
-        self.rows, self.place = self, "header"
         self.model = model = Model(file.robot, np.eye(4))
         size = float(sum(joint.lever for joint in model.joints)) or 1.0
         names = {name for name, frame in model.frames.items() if frame != 1}
@@ -306,7 +299,6 @@ class Robot:
         own = model.branch(trajectory, header["topic"], how)
         joined = {1: "linear", 3: "cubic", 5: "quintic"}[own.degree]
         claim(how == joined, f"interpolation is {how}, the file's is {joined}")
-        self.own, self.timed = Path(own), own.timed and len(own.knots) > 1
         self.links = {x.name: Body(x.frame, x(told)) for x in model.links()}
         things = [solid(one, told) for one in scene.obstacles]
         cover(things, header, self.links)
@@ -319,6 +311,7 @@ class Robot:
         self.pairs = [*self._pairs(*file.required)]
         self.notes += [note for one in things for note in one.notes()]
         self.notes += sizes(scene.obstacles)
+        self.rows = RobotRows(self, own)
 
     def _pairs(self, required: float, own: float) -> Iterator[Pair]:
         """What the problem holds apart, in order: from obstacles, then links."""
@@ -343,35 +336,6 @@ class Robot:
         near = moving == 1 and self.model.srdf is None
         return moving > 0 and not near and frozenset((one, other)) not in left
 
-    def check(self, first: Pose, by_pieces: Set[Pair]) -> None:
-        """Check that links begin outside of meshes, and that joints keep their limits.
-
-        Args:
-            first: The pose as the motion begins.
-            by_pieces: The pairs that planes for single pieces hold apart.
-
-        Raises:
-            Rejected: If one does not; `place` says where.
-        """
-        for pair in (x for x in self.pairs if x in by_pieces):
-            rest, thing, _ = pair.partner
-            thing.check_outside(first[rest], [pair.inner(first)])
-        for k in range(self.own.size):
-            self.place, ends = f"interval {k}", self.own.times[k : k + 2].tolist()
-            step = arb(ends[-1]) - arb(ends[0])
-            controls = self.own.controls(k)
-            columns = columns_of(controls)
-            for joint, points in zip(self.model.moved, columns, strict=True):
-                told = f"joint {joint.name!r} leaves its limits"
-                claim(within(points, joint.lower, joint.upper), told)
-                limits = joint.velocity, joint.acceleration
-                for order, most in enumerate(limits if self.timed else (), start=1):
-                    told = f"joint {joint.name!r} leaves the limit of its rates"
-                    points = [q / step for q in derivative(points)]  # noqa: PLW2901
-                    # Rates of straight lines change at once.
-                    kept = order < len(controls) and within(points, -most, most)
-                    claim(kept or most == np.inf, told)
-
 
 def primitive(name: str, points: Any, cover: Any) -> Solid:
     """A ball, capsule or box that holds all points, shape (n, 3)."""
@@ -386,9 +350,3 @@ def primitive(name: str, points: Any, cover: Any) -> Solid:
     holds = (off <= radius - 2.0**-46 * far).all()
     claim(holds, f"{name}: a corner of its mesh is not proved inside of what holds it")
     return Solid(name, [corners], far, radius)
-
-
-def within(points: Any, low: float, high: float) -> bool:
-    """Whether a polynomial keeps within limits."""
-    slack = SLACK * max(1.0, min(abs(low), abs(high)))
-    return keeps(points, low - slack, high + slack)

@@ -1,19 +1,21 @@
-"""The rows of an arm's trajectory against what the problem asks of the whole motion."""
+"""The rows of a trajectory against what the problem asks of the whole motion."""
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from functools import reduce
-from math import degrees
+from math import degrees, inf
 from typing import Any, Final
 
 from flint import arb, arb_mat
 
 from vdsm_pin.certificate_checker.balls import MM, SLACK, angle, claim, column, norm
 from vdsm_pin.certificate_checker.motion import (
+    Branch,
     Interval,
+    Path,
     Slices,
     always,
     columns_of,
-    keeps,
+    derivative,
     part,
 )
 from vdsm_pin.certificate_checker.path import Drawing
@@ -209,3 +211,55 @@ class Rows:
         claim(strays <= most + SLACK, told, MM * strays, MM * most)
         enough = drawn >= path.required_coverage - SLACK
         claim(enough, "coverage is {}, required is {}", drawn, path.required_coverage)
+
+
+class RobotRows:
+    """What the rows of a robot's trajectory do, in their order.
+
+    Args:
+        robot: What the files ask about.
+        own: The trajectory.
+    """
+
+    def __init__(self, robot: Any, own: Branch) -> None:
+        self.pairs, self.moved, self.path = robot.pairs, robot.model.moved, Path(own)
+        self.place, self.timed = "header", own.timed and len(own.knots) > 1
+
+    def check(self, first: Pose, by_pieces: Set[Pair]) -> None:
+        """Check that links begin outside of meshes, and that joints keep their limits.
+
+        Args:
+            first: The pose as the motion begins.
+            by_pieces: The pairs that planes for single pieces hold apart.
+
+        Raises:
+            Rejected: If one does not; `place` says where.
+        """
+        for pair in (x for x in self.pairs if x in by_pieces):
+            rest, thing, _ = pair.partner
+            thing.check_outside(first[rest], [pair.inner(first)])
+        for k in range(self.path.size):
+            self.place, ends = f"interval {k}", self.path.times[k : k + 2].tolist()
+            step = arb(ends[-1]) - arb(ends[0])
+            controls = self.path.controls(k)
+            for joint, points in zip(self.moved, columns_of(controls), strict=True):
+                told = f"joint {joint.name!r} leaves its limits"
+                claim(within(points, joint.lower, joint.upper), told)
+                limits = joint.velocity, joint.acceleration
+                for order, most in enumerate(limits if self.timed else (), start=1):
+                    told = f"joint {joint.name!r} leaves the limit of its rates"
+                    points = [q / step for q in derivative(points)]  # noqa: PLW2901
+                    # Rates of straight lines change at once.
+                    kept = order < len(controls) and within(points, -most, most)
+                    claim(kept or most == inf, told)
+
+
+def keeps(points: Sequence[arb], low: Any, high: Any) -> bool:
+    """Whether a column of q stays within limits all along."""
+    return always([points], lambda q: low <= q <= high)
+
+
+def within(points: Sequence[arb], low: float, high: float) -> bool:
+    """The same of limits that may be passed by a billionth of their size."""
+    slack = SLACK * max(1.0, min(abs(low), abs(high)))
+    return keeps(points, low - slack, high + slack)
