@@ -1,19 +1,21 @@
 """Robots of the wheel example-robot-data. Oracles: Pinocchio's own reader, Coal."""
 
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from vdsm_pin.errors import VdsmError
+from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.trajectory_files import read_motion
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.records import CLEARANCES, Verdict, combine
 
@@ -111,6 +113,44 @@ def test_a_real_robot_is_judged_as_its_libraries_see_it(name: str) -> None:
     clear = combine(tuple(o.verdict for o in judged.checks if o.name in CLEARANCES))
     if clear is Verdict.CERTIFIED:
         assert not collides(name, robot, motion)
+
+
+UNITS = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "mm": 1e-3}
+FULL = (  # revolute, continuous, prismatic and mimic joints, and limits beyond a turn
+    "ur_description/urdf/ur5_robot.urdf",
+    "panda_description/urdf/panda.urdf",
+    "kinova_description/robots/kinova.urdf",
+    "tiago_description/robots/tiago.urdf",
+    "anymal_b_simple_description/robots/anymal.urdf",
+)
+
+
+@pytest.mark.parametrize("name", [one for one in FULL if one in ALL])
+@pytest.mark.parametrize("share", [0.1, 1.0])
+def test_units_that_were_mixed_up_are_told(
+    tmp_path: Path, name: str, share: float
+) -> None:
+    """Motions within limits, in SI units and others, under either name."""
+    robot, rng, file = robot_of(name), np.random.default_rng(3), tmp_path / "t.csv"
+    low = np.array([max(joint.lower, -6.0) for joint in robot.joints])
+    high = np.array([min(joint.upper, 6.0) for joint in robot.joints])
+    middle = (low + high) / 2
+    for _ in range(5):
+        q = middle + share * (rng.uniform(low, high, (6, len(low))) - middle)
+        for wanted, stated in product((0, 1), repeat=2):
+            pairs = [(one.unit, one.other_unit) for one in robot.joints]
+            heads = zip(robot.joints, pairs, strict=True)
+            text = ",".join(f"{one.name}_{units[stated]}" for one, units in heads)
+            for row in q / [UNITS[units[wanted]] for units in pairs]:
+                text += "\n" + ",".join(map(repr, row.tolist()))
+            file.write_text(text + "\n")
+            if wanted == stated:
+                found = read_motion(file, robot.joints, None, robot.values).q
+                np.testing.assert_allclose(found, q, rtol=1e-14, atol=0)
+                continue
+            told = "is it in degrees" if wanted else "look like"
+            with pytest.raises(InvalidFile, match=told):
+                read_motion(file, robot.joints, None, robot.values)
 
 
 def collides(name: str, robot: Robot, motion: np.ndarray) -> bool:

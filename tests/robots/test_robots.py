@@ -482,6 +482,12 @@ ODD_ROWS = {
     "turn_m,slide_m\n0,0\n": "expected _rad or _deg for this joint",
     "turn_rad,slide_m\n90,0\n": "is it in degrees? expected _deg, for any number",
     "turn_deg,slide_m\n0,0\n1.57,0\n": "look like radians",
+    "turn;slide\n0;0\n": "'turn' without a unit, expected turn_rad or turn_deg",
+    "turn_rad,slide\n0,0\n": "'slide' without a unit, expected slide_m or slide_mm",
+    "turn_rad,Slide [m]\n0,0\n": "expected slide_m or slide_mm, not 'Slide [m]'",
+    "turn_rad,slide2_m\n0,0\n": "expected slide_m or slide_mm; or state",
+    "turn_rad,slide_m\n0,9\n": "is it in millimetres? expected _mm or metres, with",
+    "turn_rad,slide_mm\n0,0\n0,0.3\n": "look like metres",
     "turn_rad,slide_m\n0,x\n": "expected a number",
     "turn_rad,slide_m\n": "has no row",
 }

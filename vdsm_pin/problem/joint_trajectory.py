@@ -25,7 +25,7 @@ class JointTrajectory(AnyMotion):
         rates: Velocities, as q; per [s]. None where not known.
         changes: Accelerations, as q; per [s^2]. None where not known.
         notes: What else a reader should know, a sentence each.
-        in_degrees: Joints whose unit the file states as degrees.
+        in_degrees: Joints whose unit the file states as degrees, or as millimetres.
 
     Raises:
         InvalidInput: If shapes disagree, a name is there twice, velocities lack times,

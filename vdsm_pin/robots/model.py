@@ -23,6 +23,9 @@ Values: TypeAlias = Mapping[str, tuple[int | None, float, float]]
 MOST_TURNS: Final = 4.0 * np.pi
 """An angle beyond this, not stated in degrees, must be in degrees; [rad]."""
 
+MOST_SLID: Final = 10.0
+"""A place beyond so many times its limits, stated in metres, must be in millimetres."""
+
 
 @dataclass(frozen=True)
 class RobotJoint:
@@ -52,10 +55,22 @@ class RobotJoint:
         return "rad" if self.turns else "m"
 
     @property
+    def other_unit(self) -> str:
+        """In which tables may have them too."""
+        return "deg" if self.turns else "mm"
+
+    @property
     def most_unstated(self) -> float:
-        """The largest value that is taken for radians, unless degrees are stated."""
-        limits = [2.0 * abs(x) for x in (self.lower, self.upper) if np.isfinite(x)]
-        return max([MOST_TURNS, *limits]) if self.turns else np.inf
+        """The largest value that is taken for radians or metres, unless others are."""
+        if self.turns:
+            return max(MOST_TURNS, 2.0 * self.farthest)
+        return MOST_SLID * self.farthest or np.inf
+
+    @property
+    def farthest(self) -> float:
+        """The larger one of its limits, either way; 0 where it has none."""
+        limits = (abs(x) for x in (self.lower, self.upper) if np.isfinite(x))
+        return max(limits, default=0.0)
 
     @property
     def whose(self) -> str:

@@ -41,7 +41,7 @@ def read_csv(
     """
     known = {joint.name for joint in joints}
     with readable(file), open_text(file) as text:
-        table = Table(file, text, lambda name: _stated([name]).keys() & known)
+        table = Table(file, text, lambda name: {name, *_stated([name])} & known)
         return _read(table, joints, values, most)
 
 
@@ -69,7 +69,7 @@ def _read(
     more = [stated[one][0] for one in others]
     table.choose([*wanted, *more])
     rows, n = table.all_rows(), len(columns)
-    _check_degrees(file, rows, columns)
+    _check_small(file, rows, columns, joints)
     rest = rows[:, n + len(times) :]
     parts = [
         rest[:, k * n : (k + 1) * n]
@@ -86,7 +86,7 @@ def _read(
         parts[0],
         parts[1],
         table.notes,
-        tuple(name for name, (_, unit) in stated.items() if unit == "deg"),
+        tuple(name for name, (_, unit) in stated.items() if unit in ("deg", "mm")),
     )
 
 
@@ -111,10 +111,13 @@ def _position_columns(
     for joint in joints:
         if joint.name not in named:
             _check_unit(table, joint, joint.name)
+            like = [x for x in table.names if _is_like(x, joint.name)]
             fault = (
                 f"has no column for joint {joint.name!r}, expected "
-                f"{joint.name}_{joint.unit}; or state where it stands: `lock` in the "
-                "problem file, --lock beside --urdf"
+                f"{joint.name}_{joint.unit} or {joint.name}_{joint.other_unit}"
+                + (f", not {like[0]!r}" if like else "")
+                + "; or state where it stands: `lock` in the problem file, --lock "
+                "beside --urdf"
             )
             raise InvalidFile(file=file, where="line 1", fault=fault)
         name, unit = named[joint.name]
@@ -124,11 +127,17 @@ def _position_columns(
     return columns, factors
 
 
+def _is_like(column: str, joint: str) -> bool:
+    """Whether a column may be meant for the places of a joint."""
+    begins = re.match(re.escape(joint) + "(?![0-9a-z])", column, re.IGNORECASE)
+    return begins is not None and _SMOOTH.fullmatch(column) is None
+
+
 def _check_unit(table: Table, joint: RobotJoint, name: str, per: str = "") -> None:
     """Refuse a column of a joint that states no unit."""
     if name in table.names:
-        known = ("rad", "deg") if joint.turns else ("m", "mm")
-        words = " or ".join(f"{name}_{unit}{per}" for unit in known)
+        units = joint.unit, joint.other_unit
+        words = " or ".join(f"{name}_{unit}{per}" for unit in units)
         fault = f"has the column {name!r} without a unit, expected {words}"
         raise InvalidFile(file=table.file, where="line 1", fault=fault)
 
@@ -166,30 +175,40 @@ def _smooth_columns(
     return [found[joint.name][0] for joint in joints] if mine else []
 
 
-def _check_degrees(file: File, table: FloatArray, columns: Sequence[str]) -> None:
-    """Refuse radians under the name of degrees."""
-    angles = [k for k, name in enumerate(columns) if name.endswith("_deg")]
-    if not angles or not np.ptp(table[:, angles], axis=0).any():
-        return
-    most = float(np.abs(table[:, angles]).max())
-    if most <= np.pi and (np.abs(table[:, angles]) % 1.0 > 0.0).any():
-        fault = (
-            f"its columns in degrees stay within {most:.4g}, which is at most pi: they "
-            "look like radians; expected _rad, also for degrees as small as these"
-        )
-        raise InvalidFile(file=file, fault=fault)
+def _check_small(
+    file: File, rows: FloatArray, columns: Sequence[str], joints: Sequence[RobotJoint]
+) -> None:
+    """Refuse radians under the name of degrees, metres under that of millimetres."""
+    far = np.array([joint.farthest for joint in joints])
+    turn = np.clip(np.where(far > 0.0, far, np.inf), np.pi, 2.0 * np.pi)
+    for ending, most, unit, other, expected in (
+        ("_deg", turn, "degrees", "radians", "_rad"),
+        ("_mm", far, "millimetres", "metres", "_m"),
+    ):
+        own = [k for k, name in enumerate(columns) if name.endswith(ending)]
+        values = rows[:, own]
+        small = (np.abs(values) <= most[own]).all()
+        if small and np.ptp(values, axis=0).any() and (values % 1.0 > 0.0).any():
+            fault = (
+                f"its columns in {unit} stay within {np.abs(values).max():.4g}: they "
+                f"look like {other}; expected {expected}, also for {unit} as small as "
+                "these"
+            )
+            raise InvalidFile(file=file, fault=fault)
 
 
 def csv_text(motion: JointTrajectory, robot: Robot) -> str:
     """Waypoints as CSV, which `read_motion` reads back to the same numbers.
 
-    What turns too far to be taken for radians is in degrees, to their last digit.
+    What is too far to be taken for radians or metres is in degrees or millimetres, to
+    their last digit.
     Velocities without times, which join nothing, are left out.
     """
     far = np.abs(motion.q).max(axis=0) > [j.most_unstated for j in robot.joints]
-    units = ["deg" if f else j.unit for f, j in zip(far, robot.joints, strict=True)]
+    both = zip(far, robot.joints, strict=True)
+    units = [j.other_unit if f else j.unit for f, j in both]
     heads = [f"{j.name}_{unit}" for j, unit in zip(robot.joints, units, strict=True)]
-    parts = [np.where(far, np.rad2deg(motion.q), motion.q)]
+    parts = [motion.q / [UNITS[unit] for unit in units]]
     if motion.times is not None:
         heads.append(TIME)
         parts.append(motion.times[:, None])

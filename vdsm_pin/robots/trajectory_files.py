@@ -211,16 +211,23 @@ def _of_joints(
 
 
 def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> None:
-    """Refuse degrees under the name of radians."""
+    """Refuse degrees under the name of radians, millimetres under that of metres."""
     for k, joint in enumerate(joints):
         most = float(np.abs(q[:, k]).max())
-        if not most <= joint.most_unstated:
-            limits = np.isfinite([joint.lower, joint.upper]).any()
-            row = int(np.argmax(np.abs(q[:, k])))
-            table = "" if _has_points(file) else "_deg, for any number of turns, or "
-            fault = (
-                f"joint {joint.name!r} turns to {most:.4g} rad at waypoint {row}; "
-                f"is it in degrees? expected {table}radians"
-                + ("" if limits else ", at most two turns either way without limits")
-            )
-            raise InvalidFile(file=file, fault=fault)
+        if most <= joint.most_unstated:
+            continue
+        does, other, ending = ("turns", "degrees", "_deg, for any number of turns,")
+        limits = (
+            "" if joint.farthest else ", at most two turns either way without limits"
+        )
+        expected = f"radians{limits}"
+        if not joint.turns:
+            does, other, ending = "slides", "millimetres", "_mm"
+            expected = f"metres, with limits of {joint.lower:g} to {joint.upper:g}"
+        table = "" if _has_points(file) else f"{ending} or "
+        fault = (
+            f"joint {joint.name!r} {does} to {most:.4g} {joint.unit} at waypoint "
+            f"{np.argmax(np.abs(q[:, k]))}; is it in {other}? "
+            f"expected {table}{expected}"
+        )
+        raise InvalidFile(file=file, fault=fault)
