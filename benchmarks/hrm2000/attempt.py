@@ -92,7 +92,7 @@ class ProcessorTime(Deadline):
     def after(cls, seconds: float) -> "ProcessorTime":
         """So many seconds of this process from now."""
         end, spent = time.monotonic() + WALL * seconds, time.process_time() + seconds
-        return cls(seconds, end, spent)
+        return cls(seconds, end, spent=spent)
 
     @property
     def passed(self) -> bool:
