@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -67,11 +67,21 @@ def known(base: Path | None, limit: float) -> list[Outcome]:
     return [Outcome(**row) for row in data["outcomes"]]
 
 
+def stored(outcome: Outcome) -> dict[str, Any]:
+    """The fields of an outcome that are not as by default, numbers to six digits."""
+    default = {field.name: field.default for field in fields(Outcome)}
+    return {
+        name: float(f"{value:.6g}") if isinstance(value, float) else value
+        for name, value in asdict(outcome).items()
+        if value != default[name]
+    }
+
+
 def save(base: Path, outcomes: list[Outcome], limit: float, jobs: int) -> None:
     """The results as JSON and as a Markdown page."""
     settings = {**terms(limit), "processes": jobs, **surroundings()}
     ordered = sorted(outcomes, key=lambda o: (o.method, o.family, o.number))
-    data = {"settings": settings, "outcomes": [asdict(o) for o in ordered]}
+    data = {"settings": settings, "outcomes": [stored(o) for o in ordered]}
     base.parent.mkdir(parents=True, exist_ok=True)
     text = json.dumps(data, separators=(",", ":")) + "\n"
     base.with_suffix(".json").write_text(text, encoding="utf-8")

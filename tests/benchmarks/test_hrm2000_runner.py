@@ -107,6 +107,10 @@ def test_a_run_goes_on_only_with_the_same_code_and_limit(
     assert run.known(base, 60.0) == [GOOD]
     assert run.known(base, 10.0) == []
     assert run.known(None, 60.0) == []
+    fine = replace(GOOD, plan_s=1.0 / 3.0, psi_deg=20.0 / 3.0)
+    run.save(base, [fine], 60.0, 1)
+    assert run.known(base, 60.0) == [replace(fine, plan_s=0.333333, psi_deg=6.66667)]
+    assert "faults" not in base.with_suffix(".json").read_text()
     monkeypatch.setattr(run, "fingerprint", lambda: "another")
     assert run.known(base, 60.0) == []
 
