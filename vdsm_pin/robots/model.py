@@ -24,7 +24,7 @@ MOST_TURNS: Final = 4.0 * np.pi
 """An angle beyond this, not stated in degrees, must be in degrees; [rad]."""
 
 MOST_SLID: Final = 10.0
-"""A place beyond so many times its limits, stated in metres, must be in millimetres."""
+"""A place beyond a metre and so many times its limits must be in millimetres; [-]."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class RobotJoint:
         """The largest value that is taken for radians or metres, unless others are."""
         if self.turns:
             return max(MOST_TURNS, 2.0 * self.farthest)
-        return MOST_SLID * self.farthest or np.inf
+        return max(1.0, MOST_SLID * self.farthest) if self.farthest else np.inf
 
     @property
     def farthest(self) -> float:
