@@ -190,7 +190,7 @@ def test_certificate_checker_runs_without_the_verifier() -> None:
 
 
 def test_certificate_checker_is_short_enough_to_audit() -> None:
-    assert sum(map(code_lines, CHECKER.glob("*.py"))) <= 1498
+    assert sum(map(code_lines, CHECKER.glob("*.py"))) <= 1512
 
 
 def code_lines(path: Path) -> int:

@@ -12,6 +12,7 @@ from vdsm_pin.app.workflow import VerifyOrder, plan_to_folder, verify_to_folder
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import main as check_certificate
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.solids import Box, PointCloud, Sphere, Voxels
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -107,9 +108,18 @@ def test_a_cloud_is_planned_certified_rechecked_and_lies_are_told(
     assert verified.content.verdict == "certified"
     arguments = [str(proof), str(problem.files[0]), str(rows)]
     assert check_certificate(arguments) == 0, capsys.readouterr()
-    # The same certificate about a scan that comes 100 mm nearer proves nothing.
-    scan = np.load(tmp_path / "scan.npy")
+    # Nothing is stored for each point; the same order, told, counts as well.
     text = gzip.decompress(proof.read_bytes()).decode()
+    scan, stored = np.load(tmp_path / "scan.npy"), '"scan":[]'
+    assert stored in text
+    read = next(o for o in problem.scene.obstacles if isinstance(o, PointCloud))
+    by_halves = coherent_order(read.points)
+    for order, status in ((by_halves, 0), (by_halves[1:], 1)):
+        told = f'"scan":{order.tolist()}'
+        body = text.replace(stored, told).splitlines(keepends=True)[:-1]
+        proof.write_bytes(gzip.compress("".join([*body, sealed(body)]).encode()))
+        assert check_certificate(arguments) == status, capsys.readouterr()
+    # The same certificate about a scan that comes 100 mm nearer proves nothing.
     np.save(tmp_path / "scan.npy", scan - [0.0, 300.0, 0.0])
     changed = read_problem(problem.files[0]).sha256
     body = text.replace(problem.sha256, changed, 1).splitlines(keepends=True)[:-1]

@@ -88,10 +88,13 @@ class Solid:
 
         Args:
             pieces: Corner numbers of polygons that make up the prism's section, all
-                of as many corners; or a permutation of the numbers of the triangles.
+                of as many corners; or a permutation of the numbers of the triangles,
+                none for that by halves.
         """
         parts = f"pieces of {self.name} do not make up the whole"
         if self.ends is None:
+            if pieces == []:
+                pieces = halved(self.points.mean(axis=1)).tolist()
             claim(sorted(pieces) == [*range(len(self.points))], parts)
             self.points = self.points[np.array(pieces, dtype=int)]
             return
@@ -121,6 +124,24 @@ class Solid:
         told = [f"{self.name} is a surface only"] if only else []
         joined = f"gaps of {self.name}, up to {1e3 * gap:.2g} mm wide, are joined"
         return [*told, joined] if gap > 0.0 else told
+
+
+def halved(points: Any) -> Any:
+    """An order of points (n, 3): the lesser half along the longest axis first.
+
+    So with each half, and halves of halves; what is equal there goes by number.
+    """
+    starts, order = np.zeros(1, int), np.arange(n := len(points))
+    ranks = np.argsort(np.argsort(points, axis=0, kind="stable"), axis=0)
+    while len(starts) < n:
+        sizes, seen = np.diff(starts, append=n), points[order]
+        low, high = (f.reduceat(seen, starts) for f in (np.minimum, np.maximum))
+        axis = np.repeat(np.argmax(high - low, axis=1), sizes)
+        part = np.repeat(np.arange(len(starts)), sizes)
+        order = order[np.argsort(part * n + ranks[order, axis])]
+        middles = (starts + sizes // 2)[sizes > 1]
+        starts = np.sort(np.concatenate([starts, middles]))
+    return order
 
 
 def cover(things: Sequence[Any], header: Any, own: Iterable[str] = ()) -> None:

@@ -75,8 +75,8 @@ def pieces_of_obstacles(
 ) -> dict[str, list[Any]]:
     """The pieces of cut prisms and of meshes in the order in which planes count them.
 
-    Triangles by the numbers of their corners for a prism, numbers of the file's
-    triangles for a mesh that was sorted.
+    Triangles by the numbers of their corners for a prism; none for a mesh, cloud or
+    grid that was sorted, which has its order by halves.
 
     Args:
         obstacles: The solids, each with its number among those that were packed.
@@ -92,7 +92,7 @@ def pieces_of_obstacles(
             triangles = _triangles(obstacle)
             result[obstacle.name] = [triangles[i] for i in order]
         elif (np.diff(order) != 1).any():
-            result[obstacle.name] = order.tolist()
+            result[obstacle.name] = []
     return result
 
 

@@ -91,9 +91,9 @@ class AnyHeader(LineModel):
         "obstacle's name, or another body at rest"
     )
     pieces: dict[str, list[Number] | list[list[Number]]] = Field(
-        description="numbers of a mesh's triangles, or corner numbers of a prism's, in "
-        "the order in which planes count them; of a mesh on a link the triangles "
-        "under each of its hulls"
+        description="numbers of a mesh's triangles, none for their order by halves, or "
+        "corner numbers of a prism's, in the order in which planes count them; of a "
+        "mesh on a link the triangles under each of its hulls"
     )
     joined: dict[
         str,

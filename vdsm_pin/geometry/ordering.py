@@ -56,6 +56,9 @@ def _longest(points: FloatArray, order: IntArray, first: int, last: int) -> int:
 def coherent_order(points: FloatArray) -> IntArray:
     """An order in which every halved range is compact: a k-d tree's leaves.
 
+    A range's lesser half along its longest axis comes first, the first of several;
+    what is equal there goes by number. docs/certificate.md states this rule.
+
     Args:
         points: Shape (n, 3); [m].
 
@@ -70,7 +73,7 @@ def coherent_order(points: FloatArray) -> IntArray:
     while count > 0:
         count -= 1
         first, last = waiting[count]
-        if last - first <= 2:
+        if last - first <= 1:
             continue
         middle = (first + last) // 2
         axis = _longest(points, order, first, last)
