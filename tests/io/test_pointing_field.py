@@ -79,6 +79,11 @@ def test_between_corners_a_direction_runs_along_the_chord(tmp_path: Path) -> Non
         ("{directions: [[1, 0, 0], [1, 0, 0]], cone_deg: 5}", "2 directions for 3"),
         ("{directions: [], cone_deg: 5}", "directions"),
         ("{aim: [1, 2, 3], cone_deg: 5}", "aim"),
+        (
+            "{directions: [[0, 1, 0], [1, 0, 0], [-2, 0, 0]], cone_deg: 5}",
+            "opposite directions at points 2 and 3",
+        ),
+        ("{target: [100, 3300, 350], cone_deg: 5}", "its target on the path"),
     ],
 )
 def test_what_makes_no_sense_is_one_message_with_its_place(
@@ -89,6 +94,24 @@ def test_what_makes_no_sense_is_one_message_with_its_place(
     assert words in str(refused.value)
     assert "tip_path" in str(refused.value)
     assert "p.yaml" in str(refused.value)
+
+
+def test_a_target_on_the_closing_side_is_refused_when_there_is_one(
+    tmp_path: Path,
+) -> None:
+    """The side from the last point back to the first has its middle there."""
+    aim = "{target: [50, 3300, 350], cone_deg: 5}"
+    assert wish(tmp_path, aim).target is not None
+    with pytest.raises(InvalidFile, match="its target on the path"):
+        read(tmp_path, aim, closed="true")
+
+
+def test_a_target_is_as_far_from_the_path_as_the_tip_may_be() -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 2.0, 0.0]])
+    Pointing(0.1, target=np.array([0.3, 0.0, 1.1e-6])).check_aims(corners)
+    for near, path in (([0.3, 0.0, 0.9e-6], corners), ([0.0, 0.0, 0.0], corners[:1])):
+        with pytest.raises(InvalidInput, match="its target on the path"):
+            Pointing(0.1, target=np.array(near)).check_aims(path)
 
 
 def test_directions_need_plain_points(tmp_path: Path) -> None:

@@ -120,3 +120,7 @@ def test_start_and_goal_stand_in_a_problem_without_path_only() -> None:
         asked(goal=Posture(start.tip, np.zeros(16)))
     with pytest.raises(InvalidInput, match="nothing to draw"):
         _ = asked().path
+    with pytest.raises(InvalidInput, match="has a goal and no start"):
+        _ = asked(goal=start).path
+    with pytest.raises(InvalidInput, match="has a start and no goal"):
+        _ = asked(start=start).path

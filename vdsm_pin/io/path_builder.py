@@ -127,12 +127,15 @@ class PathBuilder(PostureBuilder):
             raise self.invalid(at, fault)
         cone = float(np.deg2rad(asked.cone_deg))
         with self.document.naming(at):
-            if asked.target is not None:
-                return Pointing(cone, target=self.frame.point(asked.target))
             if asked.direction is not None:
                 one = self.frame.direction(np.array([asked.direction]))
                 return Pointing(cone, directions=one)
-            return Pointing(cone, directions=self._directions(model, points))
+            if asked.target is not None:
+                made = Pointing(cone, target=self.frame.point(asked.target))
+            else:
+                made = Pointing(cone, directions=self._directions(model, points))
+            made.check_aims(np.concatenate([points, points[:1]][: 1 + model.closed]))
+            return made
 
     def _directions(self, model: schema.TipPathModel, points: FloatArray) -> FloatArray:
         """A direction for each corner, the closing one included, shape (m, 3)."""

@@ -207,6 +207,12 @@ class PlanningProblem(AnyProblem, ByValue):
         """
         if self.tip_path is None:
             message = f"problem {self.name!r} has no tip_path: there is nothing to draw"
+            if (self.start is None) != (self.goal is None):
+                has, lacks = ("start", "goal") if self.start else ("goal", "start")
+                message = (
+                    f"problem {self.name!r} has a {has} and no {lacks}, expected both, "
+                    "or a tip_path"
+                )
             raise InvalidInput(message)
         return self.tip_path
 

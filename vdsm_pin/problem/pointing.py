@@ -16,6 +16,7 @@ from vdsm_pin.geometry.arrays import (
     frozen,
 )
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.tolerances import TOLERANCES
 
 WIDEST: Final = np.pi / 2.0
 """Cones are narrower than this; [rad]."""
@@ -87,6 +88,42 @@ class Pointing(ByValue):
             return np.broadcast_to(directions[0], tips.shape).copy()
         columns = [np.interp(stations, corner_stations, one) for one in directions.T]
         return np.stack(columns, axis=-1)
+
+    def check_aims(self, corners: FloatArray) -> None:
+        """Refuse aims that have no direction somewhere on a path.
+
+        Args:
+            corners: Of the path, the closing one included, shape (m, 3); [m].
+
+        Raises:
+            InvalidInput: If the target lies on the path, to the tolerance of the tip,
+                or the directions at the ends of a side are opposite.
+        """
+        directions = self.directions
+        if directions is not None and len(directions) == 1:
+            return
+        aims = directions if self.target is None else self.target - corners
+        assert aims is not None
+        shortest = _shortest(aims)
+        side = int(np.argmin(shortest))
+        if shortest[side] > TOLERANCES.tip_on_path:
+            return
+        message = (
+            f"pointing has opposite directions at points {side + 1} and {side + 2}: "
+            "between them none is meant"
+            if self.target is None
+            else "pointing has its target on the path: the tip there looks nowhere"
+        )
+        raise InvalidInput(message)
+
+
+def _shortest(aims: FloatArray) -> FloatArray:
+    """The least length of aims between each one and the next, (m, 3) to (m,)."""
+    sides = np.diff(aims, axis=0, append=aims[-1:])
+    squares = np.maximum((sides**2).sum(axis=1), np.finfo(float).tiny)
+    part = np.clip(-(aims * sides).sum(axis=1) / squares, 0.0, 1.0)
+    lengths = np.linalg.norm(aims + part[:, None] * sides, axis=1)
+    return np.asarray(lengths)
 
 
 @dataclass(frozen=True)
