@@ -11,6 +11,7 @@ from vdsm_pin.arm.kinematics import joint_centres, link_angles, link_frames
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.charts import chart, packed, series
@@ -120,6 +121,7 @@ class ArmDrawing:
             chart("Base position x₀", "x₀ [mm]", [series("x₀", _INK, x0)],
                   f"Along the rail, from {ends} mm.",
                   [("rail end", low), ("rail end", high)], id="x0", far_limits=True),
+            *self._looking(shown),
             *clearances,
             chart("Changed link angles", "count",
                   [series("changed", _INK, changed, step=True)],
@@ -134,6 +136,28 @@ class ArmDrawing:
             chart("Cable lengths", "change [mm]", _changes(arm, alpha, theta),
                   "Change against the straight arm; cables a, b, c of each link.",
                   id="cables"),
+        ]  # fmt: skip
+
+    def _looking(self, shown: Thinned) -> list[dict[str, Any]]:
+        """The angle between the last link and where it shall look, of a path that says.
+
+        Errors are left out; nothing is shown where the tip is off the path.
+        """
+        path = self.problem.tip_path
+        if path is None or path.pointing is None:
+            return []
+        rows, trajectory = shown.rows, self.trajectory
+        columns = (trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows])
+        centres = joint_centres(self.problem.manipulator, *columns)
+        aims = path.aims(centres[:, -1], trajectory.path_m[rows])
+        angles = np.degrees(angles_between(centres[:, -1] - centres[:, -2], aims))
+        shown_angles = np.where(trajectory.on_path[rows], angles, np.nan)
+        cone = float(np.degrees(path.pointing.cone))
+        return [
+            chart("Where the last link looks", "angle [°]",
+                  [series("off", _INK, shown_angles)],
+                  "Angle between its axis and where it shall look on the path.",
+                  [(f"cone {cone:g}°", cone)], id="looking", floor=0.0)
         ]  # fmt: skip
 
     def stance(self, q: FloatArray) -> dict[str, Any]:
