@@ -19,7 +19,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox, TypedErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
-from vdsm_pin.repair.robot import repair_robot
+from vdsm_pin.repair.robot import repair_robot, spread
 from vdsm_pin.repair.rounds import Places
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.files import RobotFiles
@@ -227,3 +227,32 @@ def test_waypoints_are_not_added_at_the_time_of_another_one() -> None:
     assert found.moments.tolist() == [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 1.5, 2.0]
     assert (np.diff(found.through(times)) > 0.0).all()
     assert len(Places.within(np.array([3, 1]), moments).moments) == 9
+
+
+@pytest.mark.parametrize("seconds", [1.5, 8.0])
+def test_new_waypoints_leave_joints_the_time_that_they_need(
+    tmp_path: Path, seconds: float
+) -> None:
+    """1.2 rad at 1 rad/s; where they were put, they went faster even in 8 s."""
+    x, y = tip_at(0.6, 0.3)
+    this = asked(tmp_path, (1.04 * x, 1.04 * y, 0.03))
+    found = repair_robot(this, rows_of(OVER, times=np.array([0.0, seconds])))
+    assert found.verification.verdict == "certified"
+    motion = found.verification.trajectory
+    assert motion.times is not None
+    assert motion.times[[0, -1]].tolist() == [0.0, seconds]
+    speeds = np.abs(np.diff(motion.q, axis=0)) / np.diff(motion.times)[:, None]
+    np.testing.assert_allclose(speeds.max(axis=1), speeds.max(), rtol=1e-9, atol=0)
+
+
+def test_times_are_spread_between_given_waypoints_alone() -> None:
+    """By hand: 1 + 3 of 2 rad/s in [0, 8], then 1 + 1 of 4 m in [8, 9], then none."""
+    q = np.array([[0, 0], [1, 0], [-2, 4], [-2, 5], [-2, 6], [-2, 6], [-2, 6]], float)
+    times = np.array([0.0, 1.0, 8.0, 8.9, 9.0, 9.5, 10.0])
+    given = np.array([1, 0, 1, 0, 1, 1, 1], bool)
+    motion = rows_of(q, times=times)
+    found = spread(motion, given, np.array([0.5, np.inf]))
+    assert found.tolist() == [0.0, 2.0, 8.0, 8.5, 9.0, 9.5, 10.0]
+    # Where a new waypoint would have the time of another one, all stay as they were.
+    given[5] = False
+    assert spread(motion, given, np.array([0.5, np.inf])).tolist() == times.tolist()

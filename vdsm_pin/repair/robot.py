@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.repair.causes import Place, end_limits
@@ -38,22 +38,33 @@ class _Motion:
     Args:
         cell: Robot and scene.
         given: The motion that is repaired.
-        rows: The motion now; its waypoints keep their times.
+        pushed_rows: The motion now, its new waypoints at the times where they were put.
         moments: Where its waypoints were in the given motion, shape (n_rows,).
         origins: The same as joint values.
     """
 
     cell: Cell
     given: JointTrajectory
-    rows: JointTrajectory
+    pushed_rows: JointTrajectory
     moments: FloatArray
     origins: Origins
 
+    @property
+    def rows(self) -> JointTrajectory:
+        """The motion now; given waypoints keep their times."""
+        rows = self.pushed_rows
+        if rows.times is None or rows.rates is not None or self.cell.scene.carriers:
+            return rows
+        velocities = np.array([joint.velocity for joint in self._joints])
+        return replace(rows, times=spread(rows, self.origins.given >= 0, velocities))
+
     def pushed(self, margins: dict[int, float], moments: FloatArray) -> "_Motion":
         """The motion sampled closely, its pairs pushed apart by margins; [m]."""
-        places = Places.within(parts_of(self.rows), moments, self.rows.times)
+        places = Places.within(
+            parts_of(self.pushed_rows), moments, self.pushed_rows.times
+        )
         origins, at = self.origins.at(places), places.through(self.moments)
-        rows = sampled(self.rows, places)
+        rows = sampled(self.pushed_rows, places)
         if rows.rates is not None:
             origins, rows = on_curve(self.given, at, origins, rows)
         others = self._others(rows.times, rows.n_samples)
@@ -76,7 +87,7 @@ class _Motion:
                 q[k] = slopes.up(q[k], others[k : k + 1])
             rows = replace(rows, q=q)
         rows, origins = rows.only(kept), origins.only(kept)
-        return replace(self, rows=rows, moments=at[kept], origins=origins)
+        return replace(self, pushed_rows=rows, moments=at[kept], origins=origins)
 
     def at(self, moment: float, margins: dict[int, float]) -> Place:
         """What pairs have of their margins at a moment in waypoints, and why; [m]."""
@@ -118,8 +129,8 @@ def repair_robot(
 
     Args:
         cell: Robot, scene and required clearances.
-        motion: Its joints; waypoints keep their times, and between them straight lines
-            stay straight lines and smooth pieces smooth ones.
+        motion: Its joints; waypoints keep their times, new ones have some between them;
+            straight lines stay straight lines and smooth pieces smooth ones.
         pinned: Numbers of waypoints, from 0, that stay besides start and goal.
         deadline: When to give up.
 
@@ -138,6 +149,34 @@ def repair_robot(
         deadline,
         under_errors=cell.errors != ErrorBox(),
     )
+
+
+def spread(
+    motion: JointTrajectory, given: BoolArray, velocities: FloatArray
+) -> FloatArray:
+    """Times of waypoints, those between given ones by how far joints move, (n_rows,).
+
+    What is inserted lies closely where rows were pushed, and may go a long way in the
+    time that it had before it was.
+
+    Args:
+        motion: With times, of straight lines.
+        given: Which waypoints keep their times, both ends among them, (n_rows,).
+        velocities: Limits; a joint without counts by its values; [rad/s], [m/s].
+    """
+    assert motion.times is not None
+    least = np.abs(np.diff(motion.q, axis=0)) / np.where(
+        np.isfinite(velocities), velocities, 1.0
+    )
+    way = np.concatenate([[0.0], np.cumsum(least.max(axis=1))])
+    known = np.flatnonzero(given)
+    distances, indices = way[known], np.arange(len(way))
+    part = np.clip(np.searchsorted(known, indices, "right") - 1, 0, len(known) - 2)
+    start, length = distances[part], np.diff(distances)[part]
+    times = motion.times[known]
+    share = (way - start) / np.where(length > 0.0, length, np.inf)
+    found = np.where(given, motion.times, times[part] + share * np.diff(times)[part])
+    return found if (np.diff(found) > 0.0).all() else motion.times
 
 
 class _Slopes:
