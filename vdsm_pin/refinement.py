@@ -27,7 +27,7 @@ from vdsm_pin.planner.feed import within_feed
 from vdsm_pin.planner.goals import with_ends, with_path
 from vdsm_pin.planner.records import Adjustment, Plan
 from vdsm_pin.planner.start import with_known_insides
-from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.planner.strategies import ANY_WAY, strategy
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.planner.waiting import waited
 from vdsm_pin.problem.desired_path import Approach
@@ -136,7 +136,9 @@ def _plan_at_rest(
     problem: PlanningProblem, strategy_name: str, deadline: Deadline
 ) -> Refinement:
     """`plan_and_verify` of a problem in which no obstacle moves."""
-    plan_with = with_ends(problem, strategy(strategy_name))
+    plan_with = with_ends(
+        problem, strategy(strategy_name), any_way=strategy_name in ANY_WAY
+    )
     if problem.scaling is not None and strategy_name != "paper":
         message = f"strategy {strategy_name!r} does not read ratios, which 'paper' does"
         raise NoPlanFound(message)

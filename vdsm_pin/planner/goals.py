@@ -16,6 +16,7 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_centres, row_centres, straight_joints
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.by_posture import is_short, with_postures
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.planner.records import (
     UNMEASURED,
@@ -73,12 +74,15 @@ def _from(
     return replace(problem, tip_path=path, start=None, goal=None)
 
 
-def with_ends(problem: PlanningProblem, plan_with: Strategy) -> Strategy:
+def with_ends(
+    problem: PlanningProblem, plan_with: Strategy, *, any_way: bool = False
+) -> Strategy:
     """A strategy that also does what a problem asks besides drawing.
 
     Args:
         problem: As it is asked, maybe without a path.
         plan_with: Plans problems that have one.
+        any_way: Whether the arm may come to the path through joint space.
     """
 
     def planned(
@@ -91,7 +95,13 @@ def with_ends(problem: PlanningProblem, plan_with: Strategy) -> Strategy:
             return plan_with(asked, within, margin, measure)
 
         if problem.goal is None:
-            found = plan(known, clearance)
+            need = known.required_clearance + float(np.max(margin, initial=0.0))
+            short = any_way and is_short(known.manipulator)
+            found = (
+                with_postures(known, clearance, need, plan)
+                if short
+                else plan(known, clearance)
+            )
             return with_return(found) if known.path.home else found
         if problem.goal.joints is None:
             return undrawing(plan(known, clearance))

@@ -34,6 +34,9 @@ STRATEGIES: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Module and function of every strategy a user may name; the first is the default."""
 
+ANY_WAY: Final = frozenset({"fewest", "clearest", "sturdiest"})
+"""Strategies that do not say how the arm comes to the path: any way will do."""
+
 DEFAULT_STRATEGY: Final = next(iter(STRATEGIES))
 """What plans where no strategy is named."""
 

@@ -18,7 +18,7 @@ from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.planner.fewest import explore
 from vdsm_pin.planner.fewest.added_nodes import checked_start, with_start
-from vdsm_pin.planner.fewest.charts import OFFSETS, Intervals
+from vdsm_pin.planner.fewest.charts import OFFSETS, Intervals, standing
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap
 from vdsm_pin.planner.fewest.strategy import plan_fewest
@@ -251,3 +251,16 @@ def test_a_start_beyond_rail_or_reach_is_named(start: tuple[float, ...]) -> None
     )
     with pytest.raises(Infeasible, match=expected):
         plan_fewest(task, link_clearance(task), 0.0)
+
+
+@pytest.mark.parametrize("past", [-4.7e-10, 4.7e-10])
+def test_a_straight_arm_stands_a_rounding_past_the_end_of_its_rail(past: float) -> None:
+    """No turn of its links would bring it back; more than a rounding is refused."""
+    arm = replace(built_in("hrm8"), base_range=(0.0, 0.0))
+    straight = np.tile([1.0, 0.0, 0.0], (1, arm.n_links, 1))
+    tip = np.array([[arm.total_length + past, 0.0, 0.0]])
+    centres = standing(arm, tip, straight)
+    assert (centres[0, 0] == 0.0).all()
+    np.testing.assert_allclose(centres[0, 1:, 0], arm.stations[1:], atol=1e-9)
+    beyond = np.array([[arm.total_length + 1e-8, 0.0, 0.0]])
+    assert np.isnan(standing(arm, beyond, straight)).all()

@@ -20,6 +20,9 @@ ROUNDS = 30
 ENOUGH = 4e-15
 """Distance of the base from its rail over the arm's length that is rounding; [-]."""
 
+ROUNDING = TOLERANCES.planned_limit
+"""Way past an end of the rail that counts as on it; [m]."""
+
 STRAIGHT = TOLERANCES.changed_angle
 """Difference of directions up to which a joint may be put in line with others; [-]."""
 
@@ -125,7 +128,9 @@ def _on_rail(
         Whether it is.
     """
     x = _solve_base(tip, axes, lengths, 0.0, 2)
-    if low <= x <= high:
+    # No straight arm can be brought back from a rounding past an end: `placed_between`
+    # holds the base there.
+    if low - ROUNDING <= x <= high + ROUNDING:
         return True
     if np.isnan(x):
         return False
