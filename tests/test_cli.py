@@ -840,3 +840,16 @@ def test_parts_of_an_error_stand_on_lines_of_a_terminal(
     between = "\n  " if terminal else "; "
     told = f"vdsm: no plan found{between}the path is long\n"
     assert capsys.readouterr().err == told
+
+
+def test_of_many_faults_the_first_are_told_and_how_many_there_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "many.yaml"
+    file.write_text("vdsm_problem: 1\nobstacles: [" + "0, " * 100 + "]\n")
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", str(file), "--out", str(tmp_path / "out")])
+    told = capsys.readouterr().err.splitlines()
+    assert ended.value.code == 2
+    assert len(told) == 21
+    assert "obstacles[0]" in told[0] and told[-1] == "vdsm: and 83 more"

@@ -14,14 +14,20 @@ INTERRUPTED: Final = 130
 PIPE_CLOSED: Final = 141
 """As a shell reports whoever is ended by SIGPIPE; all files are written by then."""
 
+MOST_TOLD: Final = 20
+"""Faults of one file that are told, the most likely first; of the others how many."""
+
 
 def fail(error: Exception, status: int) -> NoReturn:
     """Say what went wrong, each part on a line of its own on a terminal, and end."""
     with suppress(OSError):  # of a disk that is full, say; the status still tells
         between = "\n  " if sys.stderr.isatty() else "; "
-        for one in (error, *getattr(error, "others", ())):
+        every = (error, *getattr(error, "others", ()))
+        for one in every[:MOST_TOLD]:
             told = getattr(one, "alone", one)
             typer.echo(printable(f"vdsm: {told}").replace("; ", between), err=True)
+        if len(every) > MOST_TOLD:
+            typer.echo(f"vdsm: and {len(every) - MOST_TOLD} more", err=True)
     sys.exit(status)
 
 
