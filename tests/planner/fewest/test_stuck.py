@@ -25,6 +25,7 @@ from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import (
     Stuck,
+    _least,
     at_reach,
     following,
     narrowest_passage,
@@ -38,7 +39,7 @@ from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.planner.path_rows import path_rows
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Obstacle
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.progress import shown
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import in_mm
@@ -151,6 +152,29 @@ def test_the_narrowest_passage_is_measured_though_the_body_does_not_pass(
     assert room == pytest.approx(half - task.manipulator.most_radius, abs=2e-5)
     assert too_narrow(task, place)
     assert narrowest_passage(task, replace(clearance, deadline=OVER), tip) is None
+
+
+@pytest.mark.parametrize("narrow", [0.6, 0.9])
+def test_the_narrowest_of_two_windows_is_that_of_their_middles(narrow: float) -> None:
+    wide, half = 1.5 - narrow, 0.06
+    aside = np.array([0.0, 0.075, 0.0])
+    beside = [
+        replace(o, name=f"{o.name} wide", centre=o.centre + aside)
+        for o in wall(wide, 0.07)
+    ]
+    task = replace(behind(half), scene=Scene((*wall(narrow, half), *beside)))
+    clearance = broad_phase(task, link_clearance(task))
+    passed = narrowest_passage(task, clearance, task.path.points[0])
+    assert passed is not None
+    np.testing.assert_allclose(passed.place[1:], 0.0, atol=2e-4)
+    assert abs(passed.place[0] - narrow) <= 0.025
+
+
+def test_each_narrow_place_of_a_way_is_looked_at_the_worst_first() -> None:
+    """A wide opening that is passed by its edge does not hide a narrower one."""
+    spare = np.array([5.0, 3.0, 4.0, 2.0, 2.0, 6.0, 1.0])
+    assert _least(spare).tolist() == [6, 3, 4, 1]
+    assert _least(np.full(1, 2.0)).tolist() == [0]
 
 
 def test_what_keeps_an_arm_from_following_its_tip_is_named() -> None:

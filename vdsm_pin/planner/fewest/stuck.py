@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import OutOfTime, Reached
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.broad_phase import BroadPhase
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.elastic_band import resampled
@@ -47,6 +47,8 @@ WAY_STEP: Final = 0.02
 """Distance of its points over the arm's length; [-]."""
 WAY_PLACES: Final = 20
 """Places between two of them at which it is measured."""
+OPENINGS: Final = 12
+"""Narrow places of a way of which the middle is looked for."""
 ACROSS: Final = 16
 """Directions across the way that are tried."""
 FIRST_STEP: Final = 0.3
@@ -363,13 +365,33 @@ def narrowest_passage(
     try:
         for route in space.routes(tip, 1):
             points = resampled(route, step / WAY_PLACES)
-            worst = int(np.argmin(space.room.spare(points)))
-            ends = points[[max(worst - 1, 0), min(worst + 1, len(points) - 1)]]
-            place = _middle(space.room, points[worst], ends[1] - ends[0])
-            return Passage(place, route)
+            places = np.stack(
+                [
+                    _middle(space.room, points[k], _along(points, k))
+                    for k in _least(space.room.spare(points))
+                ]
+            )
+            worst = int(np.argmin(space.room.spare(places)))
+            return Passage(places[worst], route)
     except OutOfTime:
         pass
     return None
+
+
+def _along(points: FloatArray, k: int) -> FloatArray:
+    """Which way a way leads at one of its points, shape (3,); [m]."""
+    return np.asarray(points[min(k + 1, len(points) - 1)] - points[max(k - 1, 0)])
+
+
+def _least(spare: FloatArray) -> IntArray:
+    """The places where there is less than beside them, the worst first.
+
+    A way passes wide openings by their edge: which one is narrowest shows in their
+    middles alone.
+    """
+    beside = np.concatenate([[np.inf], spare, [np.inf]])
+    least = np.flatnonzero((spare <= beside[:-2]) & (spare <= beside[2:]))
+    return np.asarray(least[np.argsort(spare[least], kind="stable")][:OPENINGS])
 
 
 def _middle(room: TipRoom, place: FloatArray, along: FloatArray) -> FloatArray:
