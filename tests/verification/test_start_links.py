@@ -75,7 +75,7 @@ def test_no_plan_is_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     def never(*_: object) -> None:
         pytest.fail("planned")
 
-    monkeypatch.setattr(refinement, "with_ends", lambda *_: never)
+    monkeypatch.setattr(refinement, "with_ends", lambda *_, **__: never)
     words = "at its start link 1 and lamp of the arm have a clearance of 1.000 mm"
     with pytest.raises(StartFolded, match=re.escape(words)):
         vp.plan(problem(tmp_path, 2.0 * RADIUS + 1.0))
