@@ -851,5 +851,5 @@ def test_of_many_faults_the_first_are_told_and_how_many_there_are(
         main(["plan", str(file), "--out", str(tmp_path / "out")])
     told = capsys.readouterr().err.splitlines()
     assert ended.value.code == 2
-    assert len(told) == 21
-    assert "obstacles[0]" in told[0] and told[-1] == "vdsm: and 83 more"
+    assert len(told) == 51
+    assert "obstacles[0]" in told[0] and told[-1] == "vdsm: and 53 more"

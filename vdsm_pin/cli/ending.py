@@ -14,7 +14,7 @@ INTERRUPTED: Final = 130
 PIPE_CLOSED: Final = 141
 """As a shell reports whoever is ended by SIGPIPE; all files are written by then."""
 
-MOST_TOLD: Final = 20
+MOST_TOLD: Final = 50
 """Faults of one file that are told, the most likely first; of the others how many."""
 
 
