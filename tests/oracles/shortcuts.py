@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path as File
+from typing import Any
 
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
@@ -32,17 +33,9 @@ def start_proof(
     return Question.of(tree, bodies, table, errors, columns).about(path, budget)
 
 
-def prove(
-    tree: Tree,
-    bodies: Sequence[Body],
-    path: Path,
-    pairs: Sequence[Pair] | PairTable,
-    errors: ErrorBox | None = None,
-    budget: Budget | None = None,
-    columns: IntArray | None = None,
-) -> Proof:
-    """All of it judged."""
-    return start_proof(tree, bodies, path, pairs, errors, budget, columns).prove()
+def prove(*asked: Any, **more: Any) -> Proof:
+    """All of it judged, as `start_proof` is asked."""
+    return start_proof(*asked, **more).prove()
 
 
 def read_scene(path: File, robot_size: float) -> Scene:

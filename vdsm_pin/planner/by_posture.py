@@ -12,13 +12,15 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres, row_centres, straight_joints
+from vdsm_pin.arm.kinematics import row_centres
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.largest_margin import drawn_length
 from vdsm_pin.planner.postures import brought_to, random_postures, within_limits
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.planner.rrt_connect import connected
+from vdsm_pin.planner.start import start_joints
 from vdsm_pin.planner.time_limit import deadline_of, with_share
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -37,10 +39,10 @@ ENOUGH: Final = 100
 """Clear ones at which no more are looked for."""
 GENERATIONS: Final = 12
 """Times that those which are not clear are changed at most."""
+TRIED: Final = 24
+"""Clear postures, unlike each other, to which the start is joined."""
 DRAWN: Final = 3
 """Plans by way of a posture after which the best one is taken."""
-TRIED: Final = 24
-"""Those of them from which the path is tried."""
 
 Planner: TypeAlias = Callable[[PlanningProblem, LinkClearance], Plan]
 """A strategy, told all but the problem and its clearance."""
@@ -77,7 +79,7 @@ def with_postures(
         return best
     with suppress(OutOfTime):
         for found in islice(_by_postures(problem, clearance, need, plan), DRAWN):
-            if best is None or _drawn(found) > _drawn(best):
+            if best is None or drawn_length(found) > drawn_length(best):
                 best = found
             if not best.undrawn:
                 break
@@ -89,21 +91,11 @@ def with_postures(
     return plan(problem, clearance)
 
 
-def _drawn(plan: Plan) -> float:
-    """Length of the path that a plan draws; [m]."""
-    rows = plan.trajectory
-    on = rows.on_path[1:] & rows.on_path[:-1]
-    return float(np.abs(np.diff(rows.path_m))[on].sum())
-
-
 def _by_postures(
     problem: PlanningProblem, clearance: LinkClearance, need: float, plan: Planner
 ) -> Iterator[Plan]:
     """Plans by way of one posture each."""
-    arm, path = problem.manipulator, problem.path
-    start = path.start_joints
-    if start is None:
-        start = straight_joints(arm, path.start)
+    arm, path, start = problem.manipulator, problem.path, start_joints(problem)
     ends = _postures(problem, clearance, start, need)
     while True:
         rows = connected(problem, clearance, start, ends, need)
@@ -177,14 +169,13 @@ def _begun_by(problem: PlanningProblem, rows: FloatArray, plan: Plan) -> Plan:
     on = np.append(np.zeros(count, np.bool_), told.on_path)
     stations = np.append(np.full(count, told.path_m[0]), told.path_m)
     whole = Trajectory.of_joints(np.concatenate([rows, told.joints]), on, stations)
-    arm = problem.manipulator
-    note = f"the arm is brought to the path through joint space, in {count} rows"
+    note = (
+        f"the arm is brought to the path through joint space, in {count} rows; other "
+        "notes call its posture there the start"
+    )
     return replace(
-        plan,
+        plan.with_rows(whole),
         problem=problem,
-        centres=joint_centres(arm, whole.x0, whole.alpha, whole.theta),
-        trajectory=whole,
-        steps=None,
-        notes=(*plan.notes, note),
+        notes=(note, *plan.notes),
         rivals=tuple(_begun_by(problem, rows, rival) for rival in plan.rivals),
     )

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres, row_centres, straight_joints
+from vdsm_pin.arm.kinematics import row_centres
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.by_posture import is_short, with_postures
@@ -25,6 +25,7 @@ from vdsm_pin.planner.records import (
     Measure,
     Plan,
 )
+from vdsm_pin.planner.start import start_joints
 from vdsm_pin.planner.strategies import Strategy
 from vdsm_pin.planner.time_limit import with_share
 from vdsm_pin.planner.tip_curve import way_back
@@ -94,18 +95,16 @@ def with_ends(
         def plan(asked: PlanningProblem, within: LinkClearance) -> Plan:
             return plan_with(asked, within, margin, measure)
 
+        need = known.required_clearance + float(np.max(margin, initial=0.0))
         if problem.goal is None:
-            need = known.required_clearance + float(np.max(margin, initial=0.0))
-            short = any_way and is_short(known.manipulator)
-            found = (
-                with_postures(known, clearance, need, plan)
-                if short
-                else plan(known, clearance)
-            )
+            if any_way and is_short(known.manipulator):
+                found = with_postures(known, clearance, need, plan)
+            else:
+                found = plan(known, clearance)
             return with_return(found) if known.path.home else found
         if problem.goal.joints is None:
             return undrawing(plan(known, clearance))
-        return _to_joints(known, problem.goal, clearance, margin, plan)
+        return _to_joints(known, problem.goal, clearance, need, plan)
 
     return planned
 
@@ -117,7 +116,7 @@ def with_return(plan: Plan) -> Plan:
     on = np.concatenate([told.on_path, np.zeros(len(back), np.bool_)])
     stations = np.concatenate([told.path_m, np.full(len(back), told.path_m[-1])])
     rows = np.concatenate([told.joints, back])
-    whole = _of_rows(plan, Trajectory.of_joints(rows, on, stations))
+    whole = plan.with_rows(Trajectory.of_joints(rows, on, stations))
     note = f"behind the path the arm goes home the way it came, in {len(back)} rows"
     return replace(
         whole,
@@ -137,21 +136,14 @@ def _off_path(plan: Plan, rows: FloatArray) -> Plan:
     """A plan of other rows, none of which draws."""
     nothing = np.zeros(len(rows), dtype=np.bool_)
     plan = replace(plan, notes=(), undrawn=(), rivals=())
-    return _of_rows(plan, Trajectory.of_joints(rows, nothing, np.zeros(len(rows))))
-
-
-def _of_rows(plan: Plan, rows: Trajectory) -> Plan:
-    """A plan with other rows."""
-    arm = plan.problem.manipulator
-    centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
-    return replace(plan, centres=centres, trajectory=rows, steps=None)
+    return plan.with_rows(Trajectory.of_joints(rows, nothing, np.zeros(len(rows))))
 
 
 def _to_joints(
     known: PlanningProblem,
     goal: Posture,
     clearance: LinkClearance,
-    margin: Margin,
+    need: float,
     plan_with: Callable[[PlanningProblem, LinkClearance], Plan],
 ) -> Plan:
     """A plan to joint values.
@@ -160,7 +152,7 @@ def _to_joints(
         known: From the start to the goal's tip.
         goal: With joint values.
         clearance: Clearance of links at given joint centres.
-        margin: Kept beyond the required clearance; [m].
+        need: Clearance to keep; [m].
         plan_with: The strategy, told all but the problem and its clearance.
 
     Raises:
@@ -168,11 +160,8 @@ def _to_joints(
         OutOfTime: If none was found in time.
     """
     assert goal.joints is not None
-    start, path = known.path.start_joints, known.path
-    if start is None:
-        start = straight_joints(known.manipulator, path.start)
-    need = known.required_clearance + float(np.max(margin, initial=0.0))
-    begin = Posture(path.start, start)
+    start = start_joints(known)
+    begin = Posture(known.path.start, start)
     back = _from(known, goal, begin.tip, begin)
     there = _from(known, begin, goal.tip, goal)
     reasons = []

@@ -1,12 +1,13 @@
 """What every strategy returns, and what it is given to measure with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.held import Axes
@@ -131,6 +132,12 @@ class Plan(Summarised):
     rivals: tuple["Plan", ...] = ()
     steps: "PaperSteps | None" = None
     rounds: tuple[tuple[Adjustment, ...], ...] = ()
+
+    def with_rows(self, rows: Trajectory) -> "Plan":
+        """The same plan with other rows, which the paper's steps do not tell of."""
+        arm = self.problem.manipulator
+        centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
+        return replace(self, centres=centres, trajectory=rows, steps=None)
 
     @cached_property
     def tip_path(self) -> TipPath:

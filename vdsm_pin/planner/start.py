@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import row_centres
+from vdsm_pin.arm.kinematics import row_centres, straight_joints
 from vdsm_pin.errors import InsideUnknown, StartBlocked, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
@@ -35,6 +35,17 @@ def start_centres(problem: PlanningProblem) -> FloatArray:
     rise = np.sqrt(square) if square >= 0.0 else np.nan
     along = path.start[0] - rise * (1.0 - arm.ratios)
     return np.column_stack([along, across])
+
+
+def start_joints(problem: PlanningProblem) -> FloatArray:
+    """Joint values q = (x0, alpha1, ..) of the arm as it starts, (1 + 2N,); [m], [rad].
+
+    The start is nearer to the rail than the arm is long.
+    """
+    path = problem.path
+    if path.start_joints is not None:
+        return path.start_joints
+    return straight_joints(problem.manipulator, path.start)
 
 
 def _located(problem: PlanningProblem) -> Iterator[tuple[Mesh, Location]]:
