@@ -221,6 +221,13 @@ def test_obstacles_are_shown_hidden_and_seen_through_one_by_one(
     assert all(page.evaluate("vdsm.view.obstacles.map((one) => one.visible)"))
 
 
+def test_what_is_marked_as_hidden_is_not_seen(report: Watched) -> None:
+    """What only pages of robots offer, among others."""
+    assert report.page.locator("[data-solids][hidden]").count() == 1
+    hidden = report.page.locator("[hidden]").all()
+    assert not any(one.is_visible() for one in hidden)
+
+
 def test_the_swept_volume_has_the_arm_at_moments_of_the_motion(report: Watched) -> None:
     page = report.page
     page.locator("[data-toggle=swept]").check()
