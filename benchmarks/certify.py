@@ -205,12 +205,12 @@ def bars(
     size: float,
     repeat: int,
     n_intervals: int = 10_000,
-    n_bars: int = 3,
-    n_balls: int = 0,
+    obstacles: tuple[int, int] = (3, 0),
     clearance: float = NEAR,
     n_links: int = 8,
 ) -> Row:
     """Time a motion beside bars, all at the same clearance, and scattered balls."""
+    n_bars, n_balls = obstacles
     arm, motion = arm_of(n_links), sway(n_intervals, n_links)
     near = [beside(motion, clearance, 90.0 + 120.0 * k, arm) for k in range(n_bars)]
     balls = scattered(motion, n_balls) if n_balls else []
@@ -296,7 +296,7 @@ def certify_growth(repeat: int = 5, quick: bool = False) -> list[Row]:
     sizes = (100, 1_000, 10_000, 100_000, 1_000_000)[: 4 if quick else 5]
     rows += [bars("intervals", n, repeat, n_intervals=n) for n in sizes]
     for n in (1, 10, 100, 1_000):
-        rows.append(bars("obstacles", n, repeat, n_bars=1, n_balls=n - 1))
+        rows.append(bars("obstacles", n, repeat, obstacles=(1, n - 1)))
     rows += [bars("links", n, repeat, n_links=n) for n in (2, 4, 8, 16, 40)]
     sizes = (100, 1_000, 10_000, 100_000, 1_000_000)[: 4 if quick else 5]
     rows += [in_tube(n, repeat if n < 1_000_000 else 1) for n in sizes]

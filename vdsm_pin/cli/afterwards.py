@@ -3,12 +3,12 @@
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
 from vdsm_pin.cli import options
-from vdsm_pin.cli.robot import Topic, refuse_beside
+from vdsm_pin.cli.robot import refuse_beside
 from vdsm_pin.text import printable
 
 commands = options.Family()
@@ -123,6 +123,21 @@ class Format(StrEnum):
     bag = "bag"
 
 
+class Taken(NamedTuple):
+    """One motion in whatever form, see `options.grouped`."""
+
+    trajectory: Annotated[
+        Path | None, options.option("FILE", "Joint angles, CSV, YAML, JSON or bag.")
+    ] = None
+    centres: Annotated[
+        Path | None, options.option("FILE", "Joint centres, as centres.csv.")
+    ] = None
+    cables: Annotated[
+        Path | None, options.option("FILE", "Cable lengths, as cables.csv.")
+    ] = None
+    topic: options.Topic = None
+
+
 @commands.add(
     "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
     "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --also mcap "
@@ -132,15 +147,7 @@ class Format(StrEnum):
 def convert(
     problem: options.ProblemArgument,
     out: options.OutFolder,
-    trajectory: Annotated[
-        Path | None, options.option("FILE", "Joint angles, CSV, YAML, JSON or bag.")
-    ] = None,
-    centres: Annotated[
-        Path | None, options.option("FILE", "Joint centres, as centres.csv.")
-    ] = None,
-    cables: Annotated[
-        Path | None, options.option("FILE", "Cable lengths, as cables.csv.")
-    ] = None,
+    motion: Taken,
     also: Annotated[
         list[Format] | None,
         options.option(
@@ -149,7 +156,6 @@ def convert(
             "are ROS 2, bag ROS 1.",
         ),
     ] = None,
-    topic: Topic = None,
     *,
     answer: options.Answer,
 ) -> None:
@@ -163,13 +169,14 @@ def convert(
     from vdsm_pin.app.subjects import read_problem_or_cell
     from vdsm_pin.problem.planning_problem import PlanningProblem
 
-    given = MotionFile(trajectory, centres, cables, topic)
     more = [one.value for one in also or ()]
     asked = read_problem_or_cell(problem)
     if not isinstance(asked, PlanningProblem):
-        refuse_beside("a robot", {"--centres": centres, "--cables": cables})
-    motion = convert_to_folder(asked, given, out, more)
-    count, notes = motion.n_samples, motion.notes
+        refuse_beside(
+            "a robot", {"--centres": motion.centres, "--cables": motion.cables}
+        )
+    found = convert_to_folder(asked, MotionFile(*motion), out, more)
+    count, notes = found.n_samples, found.notes
     lines = [printable(f"note: {note}") for note in notes]
     lines.append(f"wrote {count} waypoints to {out}")
     answer.tell("\n".join(lines), waypoints=count, folder=out, notes=notes)

@@ -1,7 +1,7 @@
 """`vdsm batch`."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import typer
 
@@ -12,6 +12,64 @@ from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import COLD_PLAN_LIMIT
 
 commands = options.Family()
+
+
+class Motions(NamedTuple):
+    """What is judged, see `options.grouped`: plans, or motions that are given."""
+
+    strategy: options.Strategy = DEFAULT_STRATEGY
+    trajectories: Annotated[
+        list[str] | None,
+        options.option(
+            "FILE",
+            "Given motions, or folders of them: each is verified for each "
+            "problem, nothing is planned; robots of a URDF need it.",
+        ),
+    ] = None
+    interpolation: options.Interpolation = "auto"
+
+    def words(self) -> tuple[str, ...]:
+        """The interpolation as on a command line, nothing where it was left out.
+
+        Raises:
+            InvalidInput: If it was given without motions.
+        """
+        if self.interpolation == "auto":
+            return ()
+        if not self.trajectories:
+            message = "--interpolation has no meaning without --trajectories"
+            raise InvalidInput(message)
+        return "--interpolation", self.interpolation
+
+
+class Running(NamedTuple):
+    """How the work is done, see `options.grouped`."""
+
+    jobs: Annotated[int, options.option("NUMBER", "Processes.", min=1)] = 1
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Skip problems that are finished and intact."),
+    ] = False
+    time_limit: options.PlanningTime = None
+    scheduler: Annotated[
+        str | None,
+        options.option("ADDRESS", "A Dask scheduler, as tcp://host:8786; no --jobs."),
+    ] = None
+
+
+class Written(NamedTuple):
+    """What is written, see `options.grouped`."""
+
+    keep: Annotated[
+        Literal["all", "failed", "none"],
+        options.option(None, "Whose files stay; every problem keeps its row."),
+    ] = "all"
+    certificate: Annotated[
+        bool, typer.Option("--certificate", help="Write a proof of each to its folder.")
+    ] = False
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Print each report to its folder too.")
+    ] = False
 
 
 @commands.add(
@@ -29,38 +87,10 @@ def batch(
             "if there is none."
         ),
     ] = None,
-    strategy: options.Strategy = DEFAULT_STRATEGY,
-    trajectories: Annotated[
-        list[str] | None,
-        options.option(
-            "FILE",
-            "Given motions, or folders of them: each is verified for each "
-            "problem, nothing is planned; robots of a URDF need it.",
-        ),
-    ] = None,
-    interpolation: options.Interpolation = "auto",
-    jobs: Annotated[int, options.option("NUMBER", "Processes.", min=1)] = 1,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Skip problems that are finished and intact."),
-    ] = False,
-    time_limit: options.PlanningTime = None,
-    scheduler: Annotated[
-        str | None,
-        options.option("ADDRESS", "A Dask scheduler, as tcp://host:8786; no --jobs."),
-    ] = None,
-    keep: Annotated[
-        Literal["all", "failed", "none"],
-        options.option(None, "Whose files stay; every problem keeps its row."),
-    ] = "all",
-    errors: options.ErrorOptions,
-    slide_error_mm: options.SlideErrors = "0",
-    certificate: Annotated[
-        bool, typer.Option("--certificate", help="Write a proof of each to its folder.")
-    ] = False,
-    pdf: Annotated[
-        bool, typer.Option("--pdf", help="Print each report to its folder too.")
-    ] = False,
+    motions: Motions,
+    running: Running,
+    written: Written,
+    errors: options.AllErrorOptions,
     answer: options.Answer,
 ) -> None:
     """Plan and verify many problems.
@@ -76,35 +106,26 @@ def batch(
     from vdsm_pin.report.words import outcome
     from vdsm_pin.text import printable
 
-    words = errors.words()
-    if slide_error_mm != "0":
-        words += ("--slide-error-mm", slide_error_mm)
-    if interpolation != "auto":
-        words += ("--interpolation", interpolation)
-        if not trajectories:
-            message = "--interpolation has no meaning without --trajectories"
-            raise InvalidInput(message)
-    if time_limit is None:  # machines of a cluster may have no machine code yet
-        time_limit = COLD_PLAN_LIMIT if scheduler else default_limit()
+    limit = running.time_limit
+    if limit is None:  # machines of a cluster may have no machine code yet
+        limit = COLD_PLAN_LIMIT if running.scheduler else default_limit()
     settings = TaskSettings(
-        strategy=strategy,
-        keep=keep,
-        errors=errors.box(slide_error_mm),
-        words=words,
-        interpolation=interpolation,
-        certificate=certificate,
-        pdf=pdf,
-        resume=resume,
-        time_limit=time_limit,
+        strategy=motions.strategy,
+        errors=errors.box(),
+        words=errors.words() + motions.words(),
+        interpolation=motions.interpolation,
+        resume=running.resume,
+        time_limit=limit,
+        **written._asdict(),
     )
     asked = Batch(
         problems=tuple(problems or ()),
         folder=out,
         settings=settings,
-        jobs=jobs,
-        scheduler=scheduler,
+        jobs=running.jobs,
+        scheduler=running.scheduler,
         quiet=answer.wordless,
-        trajectories=tuple(trajectories or ()),
+        trajectories=tuple(motions.trajectories or ()),
     )
     for folder in passed_over(asked.problems):
         note = "is in a folder that was named, and passed over; name it too to do it"

@@ -1,7 +1,7 @@
 """What commands share: arguments and options, exit codes, help pages."""
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from itertools import pairwise
@@ -23,9 +23,10 @@ from typer.core import TyperCommand
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.strategies import STRATEGIES
 from vdsm_pin.text import plain_number
-from vdsm_pin.time_limit import COLD_PLAN_LIMIT, PLAN_LIMIT
+from vdsm_pin.time_limit import COLD_PLAN_LIMIT, PLAN_LIMIT, Deadline
 
 if TYPE_CHECKING:
+    from vdsm_pin.app.motions import MotionOptions
     from vdsm_pin.problem.error_boxes import ErrorBox
 
 PASSED: Final = 0
@@ -100,17 +101,35 @@ PlanningTime = Annotated[
         min=0.001,
     ),
 ]
+Interpolated: TypeAlias = Literal["auto", "linear", "cubic", "quintic"]
 Interpolation = Annotated[
-    Literal["auto", "linear", "cubic", "quintic"],
+    Interpolated,
     option(
         None,
         "What joins waypoints: straight lines, or smooth pieces by the velocities "
         "(cubic) and accelerations (quintic) of the trajectory.",
     ),
 ]
+Topic = Annotated[
+    str | None, option("NAME[#K]", "Of a trajectory in a bag, and its message from 0.")
+]
 TimeLimit = Annotated[
     float | None, option("SECONDS", "When to give up; never by default.", min=0.001)
 ]
+
+
+class MotionGiven(NamedTuple):
+    """A motion as it was given, see `grouped`."""
+
+    trajectory: Trajectory
+    topic: Topic = None
+    time_limit: TimeLimit = None
+
+    def read_as(self, interpolation: Interpolated = "auto") -> "MotionOptions":
+        """How its file is read, from now on in the time that was given."""
+        from vdsm_pin.app.motions import MotionOptions
+
+        return MotionOptions(Deadline.after(self.time_limit), interpolation, self.topic)
 
 
 class Answer(NamedTuple):
@@ -248,35 +267,36 @@ class ErrorOptions(NamedTuple):
         return tuple(found)
 
 
+class AllErrorOptions(NamedTuple):
+    """The same, and of a robot's joints that slide."""
+
+    errors: ErrorOptions
+    slide_error_mm: SlideErrors = "0"
+
+    def box(self) -> "ErrorBox":
+        """The error box that they say, as that of `ErrorOptions`."""
+        return self.errors.box(self.slide_error_mm)
+
+    def words(self) -> tuple[str, ...]:
+        """The options as on a command line, those that were left out missing."""
+        words = self.errors.words()
+        if self.slide_error_mm != self._field_defaults["slide_error_mm"]:
+            words += ("--slide-error-mm", self.slide_error_mm)
+        return words
+
+
 def grouped(command: Run) -> Run:
     """A command whose parameters that are groups of options become these options.
 
-    A group is a `NamedTuple` of options with their defaults.
+    A group is a `NamedTuple` of options and groups of them, some with defaults.
     """
-    asked = signature(command).parameters.values()
-    groups = {one.name: one.annotation for one in asked if _is_group(one.annotation)}
+    asked = [*signature(command).parameters.values()]
 
     @wraps(command)
     def run(**given: Any) -> None:
-        for name, group in groups.items():
-            given[name] = group(*(given.pop(field) for field in group._fields))
-        command(**given)
+        command(**{one.name: _taken(one.name, one.annotation, given) for one in asked})
 
-    parameters: list[Parameter] = []
-    for one in asked:
-        if one.name not in groups:
-            parameters.append(one.replace(kind=Parameter.KEYWORD_ONLY))
-            continue
-        group = groups[one.name]
-        parameters += [
-            Parameter(
-                name,
-                Parameter.KEYWORD_ONLY,
-                default=group._field_defaults[name],
-                annotation=option,
-            )
-            for name, option in group.__annotations__.items()
-        ]
+    parameters = [option for one in asked for option in _options_of(one)]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {one.name: one.annotation for one in parameters}
     return run
@@ -284,6 +304,26 @@ def grouped(command: Run) -> Run:
 
 def _is_group(annotation: Any) -> bool:
     return isinstance(annotation, type) and hasattr(annotation, "_field_defaults")
+
+
+def _options_of(asked: Parameter) -> Iterator[Parameter]:
+    """A parameter itself, or those that a group of options stands for."""
+    group = asked.annotation
+    if not _is_group(group):
+        yield asked.replace(kind=Parameter.KEYWORD_ONLY)
+        return
+    for name, kind in group.__annotations__.items():
+        default = group._field_defaults.get(name, Parameter.empty)
+        given = Parameter(name, asked.kind, default=default, annotation=kind)
+        yield from _options_of(given)
+
+
+def _taken(name: str, kind: Any, given: dict[str, Any]) -> Any:
+    """The value of an option, or a group of the values of its options."""
+    if not _is_group(kind):
+        return given[name]
+    fields = kind.__annotations__.items()
+    return kind(*(_taken(field, its_kind, given) for field, its_kind in fields))
 
 
 def _of_joints(option: str, text: str) -> float | list[float] | dict[str, float]:

@@ -9,15 +9,14 @@ from vdsm_pin.cli.options import by_name, option, problem_argument
 from vdsm_pin.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from vdsm_pin.problem.error_boxes import ErrorBox
+    from vdsm_pin.problem.planning_problem import PlanningProblem
     from vdsm_pin.robots.cell import Cell
     from vdsm_pin.robots.files import RobotFiles
 
 
 ProblemOrNone = Annotated[
     str | None, problem_argument("A built-in name or a problem file; none with --urdf.")
-]
-Topic = Annotated[
-    str | None, option("NAME[#K]", "Of a trajectory in a bag, and its message from 0.")
 ]
 
 
@@ -114,6 +113,43 @@ class RobotOptions(NamedTuple):
         """By the names of the command line."""
         given = self._asdict().items()
         return {f"--{name.replace('_', '-')}": value for name, value in given}
+
+
+class Asked(NamedTuple):
+    """What is asked about, see `grouped`: a problem, or a robot by its files."""
+
+    robot: RobotOptions
+    problem: ProblemOrNone = None
+
+    def read(
+        self, errors: "ErrorBox", of_arm: dict[str, object], topic: str | None
+    ) -> "PlanningProblem | Cell":
+        """The problem of an arm or a robot, from a file or from options.
+
+        Args:
+            errors: Added to those of its file.
+            of_arm: Options that only an arm has, by name.
+            topic: An option that only a robot has.
+
+        Raises:
+            InvalidInput: If a file is bad, or an option has no meaning for it.
+        """
+        if self.robot.urdf is not None:
+            refuse_beside("--urdf", {"PROBLEM": self.problem, **of_arm})
+            return self.robot.cell().under(errors)
+        refuse_beside("a problem", self.robot.named())
+        if self.problem is None:
+            message = "expected a PROBLEM, or --urdf for any other robot"
+            raise InvalidInput(message)
+        from vdsm_pin.app.subjects import read_problem_or_cell
+        from vdsm_pin.problem.planning_problem import PlanningProblem
+
+        asked = read_problem_or_cell(self.problem)
+        if isinstance(asked, PlanningProblem):
+            refuse_beside("an arm", {"--topic": topic})
+        else:
+            refuse_beside("a robot", of_arm)
+        return asked.under(errors)
 
 
 def _arguments(given: Sequence[str]) -> dict[str, str]:

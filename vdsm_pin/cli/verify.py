@@ -2,22 +2,39 @@
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from vdsm_pin.cli import options
-from vdsm_pin.cli.robot import ProblemOrNone, RobotOptions, Topic, refuse_beside
-from vdsm_pin.errors import InvalidInput
-from vdsm_pin.time_limit import Deadline, enforced
+from vdsm_pin.cli.robot import Asked
+from vdsm_pin.time_limit import enforced
 
 if TYPE_CHECKING:
     from vdsm_pin.app.workflow import VerifyOrder
-    from vdsm_pin.problem.error_boxes import ErrorBox
-    from vdsm_pin.problem.planning_problem import PlanningProblem
-    from vdsm_pin.robots.cell import Cell
 
 commands = options.Family()
+
+
+class Results(NamedTuple):
+    """What is written, see `options.grouped`."""
+
+    out: options.OutFolder
+    certificate: Annotated[
+        Path | None, options.option("FILE", "Write the proof to this file.")
+    ] = None
+    pdf: Annotated[
+        Path | None,
+        options.option(
+            "FILE", "Print the report to this file; needs Chromium or Chrome."
+        ),
+    ] = None
+    all_pairs: Annotated[
+        bool,
+        typer.Option(
+            "--all-pairs", help="List every pair at every interval in clearance.csv."
+        ),
+    ] = False
 
 
 @commands.add(
@@ -29,32 +46,13 @@ commands = options.Family()
 )
 def verify(
     context: typer.Context,
-    trajectory: options.Trajectory,
-    out: options.OutFolder,
+    motion: options.MotionGiven,
+    results: Results,
     *,
-    problem: ProblemOrNone = None,
-    errors: options.ErrorOptions,
-    slide_error_mm: options.SlideErrors = "0",
-    certificate: Annotated[
-        Path | None, options.option("FILE", "Write the proof to this file.")
-    ] = None,
-    pdf: Annotated[
-        Path | None,
-        options.option(
-            "FILE", "Print the report to this file; needs Chromium or Chrome."
-        ),
-    ] = None,
-    time_limit: options.TimeLimit = None,
-    all_pairs: Annotated[
-        bool,
-        typer.Option(
-            "--all-pairs", help="List every pair at every interval in clearance.csv."
-        ),
-    ] = False,
+    asked: Asked,
+    errors: options.AllErrorOptions,
     interpolation: options.Interpolation = "auto",
     answer: options.Answer,
-    robot: RobotOptions,
-    topic: Topic = None,
 ) -> None:
     """Prove a trajectory clear, or say where it is not.
 
@@ -62,65 +60,34 @@ def verify(
     clearance.csv, link_angles.csv, centres.csv and cables.csv; of a robot (problem with
     robot, or --urdf) the first three.
     """
-    of_arm: dict[str, object] = {
-        "--pdf": pdf,
-        "--all-pairs": all_pairs,
-    }
-    deadline = Deadline.after(time_limit)
-    box = errors.box(slide_error_mm)
-    from vdsm_pin.app.motions import MotionOptions
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.report.run_record import now
 
-    with enforced(deadline, grace=0.0):
-        asked = asked_problem(problem, box, robot, of_arm, topic)
-        if certificate is not None and robot.urdf is not None:
+    read_as, certificate = motion.read_as(interpolation), results.certificate
+    with enforced(read_as.deadline, grace=0.0):
+        of_arm: dict[str, object] = {
+            "--pdf": results.pdf,
+            "--all-pairs": results.all_pairs,
+        }
+        problem = asked.read(errors.box(), of_arm, motion.topic)
+        if certificate is not None and asked.robot.urdf is not None:
             from vdsm_pin.app.stated_problem import stated_cell
 
-            files = robot.files(), robot.scene, certificate, trajectory
-            asked = stated_cell(asked, *files)
+            robot = asked.robot
+            files = robot.files(), robot.scene, certificate, motion.trajectory
+            problem = stated_cell(problem, *files)
         order = VerifyOrder(
-            problem=asked,
-            trajectory=trajectory,
-            folder=out,
+            problem=problem,
+            trajectory=motion.trajectory,
+            folder=results.out,
             command=context.obj,
             certificate=certificate,
-            pdf=pdf,
-            options=MotionOptions(deadline, interpolation, topic),
-            all_pairs=all_pairs,
+            pdf=results.pdf,
+            options=read_as,
+            all_pairs=results.all_pairs,
             date=now(),
         )
     options.end(passed=_verify_and_tell(order, answer))
-
-
-def asked_problem(
-    problem: str | None,
-    errors: "ErrorBox",
-    of_robot: RobotOptions,
-    of_arm: dict[str, object],
-    topic: str | None,
-) -> "PlanningProblem | Cell":
-    """The problem of an arm or a robot, from a file or from options.
-
-    Raises:
-        InvalidInput: If a file is bad, or an option has no meaning for it.
-    """
-    if of_robot.urdf is not None:
-        refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
-        return of_robot.cell().under(errors)
-    refuse_beside("a problem", of_robot.named())
-    if problem is None:
-        message = "expected a PROBLEM, or --urdf for any other robot"
-        raise InvalidInput(message)
-    from vdsm_pin.app.subjects import read_problem_or_cell
-    from vdsm_pin.problem.planning_problem import PlanningProblem
-
-    asked = read_problem_or_cell(problem)
-    if isinstance(asked, PlanningProblem):
-        refuse_beside("an arm", {"--topic": topic})
-    else:
-        refuse_beside("a robot", of_arm)
-    return asked.under(errors)
 
 
 def _verify_and_tell(order: "VerifyOrder", answer: options.Answer) -> bool:
@@ -160,18 +127,14 @@ def _verify_and_tell(order: "VerifyOrder", answer: options.Answer) -> bool:
 )
 def repair(
     context: typer.Context,
-    trajectory: options.Trajectory,
+    motion: options.MotionGiven,
     out: options.OutFolder,
     *,
-    problem: ProblemOrNone = None,
-    errors: options.ErrorOptions,
-    slide_error_mm: options.SlideErrors = "0",
-    robot: RobotOptions,
-    topic: Topic = None,
+    asked: Asked,
+    errors: options.AllErrorOptions,
     pin: Annotated[
         list[int] | None, options.option("ROW", "A waypoint, from 0, that stays.")
     ] = None,
-    time_limit: options.TimeLimit = None,
     answer: options.Answer,
 ) -> None:
     """Mend a trajectory until it is certified.
@@ -180,17 +143,17 @@ def repair(
     trajectory.csv, repair.json (how far each waypoint moved) and what verify writes;
     where no such trajectory is found, nothing, and says why.
     """
-    from vdsm_pin.app.motions import MotionOptions
     from vdsm_pin.app.repair import repair_to_folder
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.report.terminal import show_verification
 
-    deadline, box = Deadline.after(time_limit), errors.box(slide_error_mm)
-    with enforced(deadline, grace=0.0):
-        asked = asked_problem(problem, box, robot, {}, topic)
-    with enforced(deadline):
-        options = MotionOptions(deadline, topic=topic)
-        order = VerifyOrder(asked, trajectory, out, context.obj, options=options)
+    read_as = motion.read_as()
+    with enforced(read_as.deadline, grace=0.0):
+        problem = asked.read(errors.box(), {}, motion.topic)
+    with enforced(read_as.deadline):
+        order = VerifyOrder(
+            problem, motion.trajectory, out, context.obj, options=read_as
+        )
         found, file = repair_to_folder(order, tuple(pin or ()))
     count, new, most = len(found.moved), int((found.given < 0).sum()), found.moved.max()
     facts = {"waypoints": count, "new": new, "moved_at_most": float(most)}

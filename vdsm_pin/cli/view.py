@@ -1,7 +1,7 @@
 """`vdsm view`, `vdsm export`: a motion as it looks."""
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import typer
 
@@ -49,6 +49,36 @@ def view(
     serve(problem, trajectory, port=port, watch=watch, announce=typer.echo)
 
 
+class Picture(NamedTuple):
+    """How it looks, see `options.grouped`."""
+
+    look: Annotated[
+        str,
+        options.option(
+            "VIEW", "overview, side, top, front, tip, or a direction: 1,-1,0.5."
+        ),
+    ] = OVERVIEW
+    width: Annotated[
+        int, options.option("PIXELS", "Of the picture.", min=64, max=4096)
+    ] = WIDTH
+    height: Annotated[
+        int, options.option("PIXELS", "Of the picture.", min=64, max=4096)
+    ] = HEIGHT
+    numbers: Annotated[bool, typer.Option("--numbers", help="Number the links.")] = (
+        False
+    )
+
+    @property
+    def given(self) -> dict[str, object]:
+        """What was asked for, by the names of the command line."""
+        return {
+            "--look": self.look != OVERVIEW,
+            "--numbers": self.numbers,
+            "--width": self.width != WIDTH,
+            "--height": self.height != HEIGHT,
+        }
+
+
 @commands.add(
     "vdsm export paper/obs1 --trajectory out/obs1/trajectory.csv --out obs1.glb",
     "vdsm export mine.yaml --trajectory mine.csv --out mine.png --moment 120",
@@ -76,22 +106,8 @@ def export(
             max=86400.0,
         ),
     ] = None,
-    look: Annotated[
-        str,
-        options.option(
-            "VIEW", "overview, side, top, front, tip, or a direction: 1,-1,0.5."
-        ),
-    ] = OVERVIEW,
-    width: Annotated[
-        int, options.option("PIXELS", "Of the picture.", min=64, max=4096)
-    ] = WIDTH,
-    height: Annotated[
-        int, options.option("PIXELS", "Of the picture.", min=64, max=4096)
-    ] = HEIGHT,
-    numbers: Annotated[
-        bool, typer.Option("--numbers", help="Number the links.")
-    ] = False,
     *,
+    picture: Picture,
     answer: options.Answer,
 ) -> None:
     """Write a motion as glTF, as a picture or as a film.
@@ -104,18 +120,17 @@ def export(
     from vdsm_pin.report.film import Shot, look_of
 
     ending = out.suffix.lower()
-    drawn = {"--width": width != WIDTH, "--height": height != HEIGHT}
-    seen = {"--look": look != OVERVIEW, "--numbers": numbers, **drawn}
     unused: dict[str, dict[str, object]] = {
-        ".glb": {"--moment": moment, **seen},
+        ".glb": {"--moment": moment, **picture.given},
         ".png": {"--seconds": seconds},
         ".mp4": {"--moment": moment},
     }
     refuse_beside(ending, unused.get(ending, {}))
     odd = 2 if ending == ".mp4" else 1  # players need even numbers
-    shot = Shot(look_of(look), width - width % odd, height - height % odd, numbers)
+    width, height = (n - n % odd for n in (picture.width, picture.height))
+    shot = Shot(look_of(picture.look), width, height, picture.numbers)
     asked = read_problem_or_cell(problem)
-    if look == "tip" and not isinstance(asked, PlanningProblem):
-        refuse_beside("a robot", {"--look tip": look})
+    if picture.look == "tip" and not isinstance(asked, PlanningProblem):
+        refuse_beside("a robot", {"--look tip": picture.look})
     write(asked, trajectory, out, moment or 0.0, seconds, shot)
     answer.tell(f"wrote {out}", file=out)
