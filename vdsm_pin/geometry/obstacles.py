@@ -1,7 +1,7 @@
 """Distance between a body and a whole obstacle."""
 
 from math import sqrt
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -27,6 +27,9 @@ STACK: Final = 64
 
 TURNS: Final = 3
 """How often `facing` goes from a segment to a box and back."""
+
+Middle: TypeAlias = tuple[float, float, float]
+"""A point; [m]."""
 
 
 class Measuring(NamedTuple):
@@ -120,6 +123,7 @@ def obstacle_bracket(
         return
     low, high = scratch[-2], scratch[-1]
     box_of(body, low, high)
+    middle = middle_of(body)
     trial[NORMAL:NEAR] = out[NORMAL:NEAR]
     out[LOWER] = out[UPPER] = np.inf
     stack[0] = root
@@ -129,7 +133,7 @@ def obstacle_bracket(
         node = stack[waiting]
         if box_distance(pieces, node, low, high) >= out[LOWER]:
             continue
-        if _plane_gap(pieces, node, body, scratch[0]) >= out[LOWER]:
+        if _plane_gap(pieces, node, body, middle, scratch[0]) >= out[LOWER]:
             continue
         first = pieces.node_range[node, 0]
         if pieces.node_range[node, 1] - first > 1:
@@ -180,55 +184,66 @@ def node_support(
     return least
 
 
-@compiled
-def _spine(body: Body, c: int) -> tuple[float, float]:
-    """Coordinate c of both ends of a segment in a body: an axis, or the middle."""
-    points = body.points
-    if body.used[1] == 2:
-        return points[0, c], points[1, c]
-    middle = 0.0
-    for k in range(body.used[0]):
-        middle += points[k, c]
-    middle /= body.used[0]
-    return middle, middle
+@compiled(inline=False)
+def middle_of(body: Body) -> Middle:
+    """The mean of a body's points; [m]."""
+    points, count = body.points, body.used[0]
+    x = y = z = 0.0
+    for k in range(count):
+        x, y, z = x + points[k, 0], y + points[k, 1], z + points[k, 2]
+    return x / count, y / count, z / count
 
 
 @compiled
-def facing(pieces: PackedPieces, node: int, body: Body, n: FloatArray) -> bool:
-    """A guess of n towards a node's box, from a segment in the body.
+def _along_axis(
+    low: FloatArray, high: FloatArray, points: FloatArray, n: FloatArray
+) -> None:
+    """From the nearest point of a segment, of its two ends, to a box; n is written."""
+    span = along = 0.0
+    for c in range(3):
+        d = points[1, c] - points[0, c]
+        span += d * d
+        along += d * (0.5 * (low[c] + high[c]) - points[0, c])
+    for _ in range(TURNS):
+        t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
+        along = 0.0
+        for c in range(3):
+            start = points[0, c]
+            d = points[1, c] - start
+            at = start + t * d
+            inside = min(max(at, low[c]), high[c])
+            n[c] = inside - at
+            along += d * (inside - start)
 
-    The point of the box nearest to a point of the segment, the point of the segment
+
+@compiled
+def facing(
+    pieces: PackedPieces, node: int, body: Body, middle: Middle, n: FloatArray
+) -> bool:
+    """A guess of n towards a node's box: from the axis or the middle of a body.
+
+    Of an axis the point of the box nearest to a point of it, the point of the axis
     nearest to that one, and so on: a few turns come near the two nearest points.
 
     Args:
         pieces: The scene.
         node: The node.
-        body: The body.
+        body: The body; one of two corners is its axis.
+        middle: As `middle_of` has it.
         n: Result, unit vector, shape (3,).
 
     Returns:
         Whether there is such a direction; there is none where they seem to meet.
     """
     low, high = pieces.node_low[node], pieces.node_high[node]
-    span = along = 0.0
-    for c in range(3):
-        start, end = _spine(body, c)
-        d = end - start
-        span += d * d
-        along += d * (0.5 * (low[c] + high[c]) - start)
-    squared = 0.0
-    for _ in range(TURNS):
-        t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
-        squared = along = 0.0
-        for c in range(3):
-            start, end = _spine(body, c)
-            d = end - start
-            at = start + t * d
-            inside = min(max(at, low[c]), high[c])
-            n[c] = inside - at
-            squared += n[c] * n[c]
-            along += d * (inside - start)
-    length = sqrt(squared)
+    if body.used[1] == 2:
+        _along_axis(low, high, body.points, n)
+    else:
+        x, y, z = middle
+        n[0] = min(max(x, low[0]), high[0]) - x
+        n[1] = min(max(y, low[1]), high[1]) - y
+        n[2] = min(max(z, low[2]), high[2]) - z
+    length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
     if not 0.0 < length < np.inf:
         return False
     for c in range(3):
@@ -237,9 +252,11 @@ def facing(pieces: PackedPieces, node: int, body: Body, n: FloatArray) -> bool:
 
 
 @compiled
-def _plane_gap(pieces: PackedPieces, node: int, body: Body, n: FloatArray) -> float:
+def _plane_gap(
+    pieces: PackedPieces, node: int, body: Body, middle: Middle, n: FloatArray
+) -> float:
     """Gap of one plane between a body and a node's box; a lower bound; [m]."""
-    if not facing(pieces, node, body, n):
+    if not facing(pieces, node, body, middle, n):
         return -np.inf
     reach = body_reach(body, n[0], n[1], n[2])
     return box_support(pieces, node, n[0], n[1], n[2]) - reach

@@ -8,6 +8,7 @@ import numpy as np
 from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.kernels import NEAR, NORMAL, Goal
+from vdsm_pin.geometry.obstacles import middle_of
 from vdsm_pin.geometry.pieces import HALF_SPACE
 from vdsm_pin.proof.layouts import (
     CLAIM,
@@ -126,7 +127,7 @@ def _write_ranges(
     """Write planes for ranges of pieces, as few as the hierarchy allows."""
     pieces, space, pair = task.pieces, work.space, int(row[PAIR])
     lost, needed = task.pairs.lost[pair], task.pairs.required[pair]
-    n, nodes = np.zeros(3), space.nodes
+    n, nodes, middle = np.zeros(3), space.nodes, middle_of(space.body)
     waiting = 1
     nodes[0] = pieces.root[task.pairs.obstacle[pair]]
     while waiting > 0 and count >= 0:
@@ -139,7 +140,7 @@ def _write_ranges(
             claim = _shortened(task, work, row, node, n)
             count = _write(task, row, node, n, claim, records, count)
             continue
-        bound = node_bound(pieces, space, node, lost, n)
+        bound = node_bound(pieces, space, node, middle, lost, n)
         if bound >= needed:
             claim = _shortened(task, work, row, node, n)
             count = _write(task, row, node, n, claim, records, count)
@@ -151,14 +152,12 @@ def _write_ranges(
 
 @compiled(inline=False)
 def _write_slice(
-    slicing: Slicing, work: Workspace, row: FloatArray, records: FloatArray, count: int
+    task: Task, work: Workspace, row: FloatArray, records: FloatArray, count: int
 ) -> int:
     """Write the planes of one slice; returns the new count, -1 without room.
 
-    The slice is one that `bound_between` proves.
+    The slice is the one that `bound_between` bounded last, and proves.
     """
-    task = slicing.task
-    bound_between(slicing, row)
     pair = int(row[PAIR])
     root = task.pieces.root[task.pairs.obstacle[pair]]
     n = work.space.out[NORMAL:NEAR].copy()
@@ -186,14 +185,15 @@ def _record_pair(
     bound_between(slicing, row)
     work.planes[pair, :3] = work.space.out[NORMAL:NEAR]
     if row[KEY] >= task.pairs.required[pair]:
-        return _write_slice(slicing, work, row, records, count), True
+        return _write_slice(task, work, row, records, count), True
     verdict, n_slices = resolve(slicing, work.heap, row, new_witness())
     if verdict != CERTIFIED:
         return count, False
     for k in range(n_slices):
         if count >= 0:
             row[:] = work.heap[k]
-            count = _write_slice(slicing, work, row, records, count)
+            bound_between(slicing, row)
+            count = _write_slice(task, work, row, records, count)
     return count, True
 
 

@@ -104,7 +104,7 @@ def new_witnesses(n_pairs: int, limit: float) -> Witnesses:
 
 @compiled(inline=False)
 def bound_between(slicing: Slicing, row: FloatArray) -> None:
-    """Bound a slice and write the result to row[KEY].
+    """Bound a slice as well as shows whether it is enough; row[KEY] is the result.
 
     Args:
         slicing: What they are bounded with.
@@ -112,7 +112,9 @@ def bound_between(slicing: Slicing, row: FloatArray) -> None:
     """
     place_pair(slicing, row)
     task, ends, space = slicing.task, slicing.ends, slicing.space
-    slice_bound(task, ends, space, int(row[PAIR]), row[END] - row[START])
+    pair, h = int(row[PAIR]), row[END] - row[START]
+    ease = task.pairs.required[pair]
+    slice_bound(task, ends, space, pair, h, np.inf, ease)
     row[KEY] = space.out[LOWER]
 
 

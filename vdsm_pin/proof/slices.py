@@ -20,9 +20,11 @@ from vdsm_pin.geometry.kernels import (
 )
 from vdsm_pin.geometry.obstacles import (
     STACK,
+    Middle,
     box_of,
     box_support,
     facing,
+    middle_of,
     node_support,
     push_children,
 )
@@ -95,10 +97,24 @@ def plane_bound(
 
 @compiled
 def node_bound(
-    pieces: PackedPieces, space: Space, node: int, lost: float, n: FloatArray
+    pieces: PackedPieces,
+    space: Space,
+    node: int,
+    middle: Middle,
+    lost: float,
+    n: FloatArray,
 ) -> float:
-    """The same of a plane that faces the node's box, written to n, by that box; [m]."""
-    if not facing(pieces, node, space.body, n):
+    """The same of a plane that faces the node's box, written to n, by that box; [m].
+
+    Args:
+        pieces: The scene.
+        space: Its `body` is loaded.
+        node: The node.
+        middle: Of the body.
+        lost: What every plane of the pair loses; [m].
+        n: Written, shape (3,); [-].
+    """
+    if not facing(pieces, node, space.body, middle, n):
         return -np.inf
     support = box_support(pieces, node, n[0], n[1], n[2])
     return support - body_reach(space.body, n[0], n[1], n[2]) - lost
@@ -175,6 +191,7 @@ def _mesh_bound(
     low, high = space.scratch[SCRATCH_ROWS], space.scratch[SCRATCH_ROWS + 1]
     box_of(space.body, low, high)
     nodes, trial, out = space.nodes, space.trial, space.out
+    middle = middle_of(space.body)
     trial[NORMAL:NEAR] = out[NORMAL:NEAR]
     out[LOWER] = out[UPPER] = np.inf
     nodes[0] = root
@@ -183,7 +200,7 @@ def _mesh_bound(
         waiting -= 1
         node = nodes[waiting]
         n = trial[BRACKET : BRACKET + 3]
-        bound = node_bound(pieces, space, node, lost, n)
+        bound = node_bound(pieces, space, node, middle, lost, n)
         if bound >= min(out[LOWER], max(enough, part * out[LOWER])):
             left_out = min(left_out, bound)
             continue
@@ -229,7 +246,13 @@ def loaded_bound(
 
 @compiled(inline=False)
 def slice_bound(
-    task: Task, ends: Ends, space: Space, pair: int, h: float, enough: float = np.inf
+    task: Task,
+    ends: Ends,
+    space: Space,
+    pair: int,
+    h: float,
+    enough: float = np.inf,
+    ease: float = np.inf,
 ) -> None:
     """Least clearance of a pair over a slice, proved by planes.
 
@@ -242,6 +265,7 @@ def slice_bound(
         pair: Number of the pair.
         h: Length of the slice; 0 for an instant, where `upper` is a true distance.
         enough: As for `loaded_bound`; inf for an instant.
+        ease: The same.
     """
     load_body(task, mover_of(task, pair), ends, space.body, h)
-    loaded_bound(task, space, pair, h == 0.0, np.inf, enough)
+    loaded_bound(task, space, pair, h == 0.0, ease, enough)
