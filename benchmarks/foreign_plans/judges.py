@@ -50,6 +50,7 @@ class Plan:
         number: The problem.
         resolution: At which it was planned; [-].
         waypoints: Rows of joint values; [rad].
+        parts: Hulls that stand for the mesh of a link in it.
     """
 
     robot: str
@@ -57,6 +58,7 @@ class Plan:
     number: int
     resolution: float
     waypoints: list[list[float]]
+    parts: int = 1
 
 
 @dataclass(frozen=True)

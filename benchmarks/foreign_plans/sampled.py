@@ -3,9 +3,10 @@
 Nothing here calls the proof, its readers or its geometry.
 """
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import coal
 import numpy as np
@@ -21,6 +22,9 @@ SHAPES: Final = {
     "cylinder": lambda height, radius: coal.Cylinder(radius, height),
 }
 
+LinkHulls: TypeAlias = Mapping[str, Sequence[FloatArray]]
+"""By link the corners of each of its hulls in its frame, shape (n, 3); [m]."""
+
 
 class Sampled:
     """Collisions of one robot in one scene at single configurations.
@@ -28,19 +32,17 @@ class Sampled:
     Args:
         robot: Name of the robot.
         scene: A PlanningScene of boxes, spheres and cylinders.
+        hulls: What stands for links; None for the hull of each mesh.
     """
 
-    def __init__(self, robot: str, scene: Path) -> None:
+    def __init__(self, robot: str, scene: Path, hulls: LinkHulls | None = None) -> None:
         folder = source(robot)
         urdf, srdf = str(folder / f"{robot}.urdf"), str(folder / f"{robot}.srdf")
         self.model = pin.buildModelFromUrdf(urdf)
-        self.geometry = pin.buildGeomFromUrdf(
-            self.model, urdf, pin.COLLISION, package_dirs=[str(folder)]
-        )
-        for thing in self.geometry.geometryObjects:
-            if isinstance(thing.geometry, coal.BVHModelBase):
-                thing.geometry.buildConvexHull(True, "Qt")
-                thing.geometry = thing.geometry.convex
+        if hulls is None:
+            self.geometry = _meshes_as_hulls(self.model, urdf)
+        else:
+            self.geometry = _of_hulls(self.model, hulls)
         self.geometry.addAllCollisionPairs()
         pin.removeCollisionPairs(self.model, self.geometry, srdf)
         n = self.geometry.ngeoms
@@ -120,6 +122,32 @@ class Sampled:
             places.append(np.array([f.translation for f in self.data.oMf]))
         steps = np.linalg.norm(np.diff(places, axis=0), axis=2).sum(axis=0)
         return float(steps.max())
+
+
+def _meshes_as_hulls(model: pin.Model, urdf: str) -> pin.GeometryModel:
+    """The links' solids as Pinocchio reads them, meshes as their hulls."""
+    folders = [str(Path(urdf).parent)]
+    found = pin.buildGeomFromUrdf(model, urdf, pin.COLLISION, package_dirs=folders)
+    for thing in found.geometryObjects:
+        if isinstance(thing.geometry, coal.BVHModelBase):
+            thing.geometry.buildConvexHull(True, "Qt")
+            thing.geometry = thing.geometry.convex
+    return found
+
+
+def _of_hulls(model: pin.Model, hulls: LinkHulls) -> pin.GeometryModel:
+    """Hulls of links' corners, in the links' frames as Pinocchio has them."""
+    found = pin.GeometryModel()
+    for name, each in hulls.items():
+        number = model.getBodyId(name)
+        frame = model.frames[number]
+        for k, points in enumerate(each):
+            corners = coal.StdVec_Vec3s()
+            corners.extend(list(points))
+            solid = coal.Convex.convexHull(corners, True, "Qt")
+            place = frame.parentJoint, number, frame.placement
+            found.addGeometryObject(pin.GeometryObject(f"{name}_{k}", *place, solid))
+    return found
 
 
 def _things(scene: Path) -> list[tuple[str, Any, pin.SE3]]:

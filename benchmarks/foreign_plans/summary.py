@@ -7,7 +7,7 @@ from itertools import groupby
 import numpy as np
 
 from benchmarks.common import described, surroundings
-from benchmarks.foreign_plans.judges import DENSE, DENSITIES, Judged
+from benchmarks.foreign_plans.judges import DENSE, DENSITIES, Judged, Plan
 from benchmarks.foreign_plans.problems import Problem
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verdict
@@ -54,10 +54,12 @@ def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
         _sentence(judged),
         "RRTConnect with OMPL's simplification, fixed seed, on problems of "
         "MotionBenchMaker; links and obstacles as the convex bodies that the plan was "
-        "made with. Missed: plans that collide and in which samples of that density "
-        "(part of the space's extent, the fastest joint, the fastest frame) meet no "
-        "collision. Deepest: by Coal. Times: processor time of a whole verification, "
-        "Pinocchio and Coal included, the least of three. Repaired: of what collides. "
+        "made with: the hull of each mesh, and several where a problem's own start or "
+        "goal collides with one hull. Missed: plans that collide and in which samples "
+        "of that density (part of the space's extent, the fastest joint, the fastest "
+        "frame) meet no collision. Deepest: by Coal. Times: processor time of a whole "
+        "verification, Pinocchio and Coal included, the least of three, one thread; of "
+        f"all plans with one hull a mesh {_all(judged)}. Repaired: of what collides. "
         "`python -m benchmarks.foreign_plans.run`.",
         _table(HEAD, map(_row, groups)),
         f"Verdicts that Coal contradicts: {len(faults)} (in {DENSE:,} states of each "
@@ -75,6 +77,15 @@ def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
     return "\n\n".join(lines) + "\n"
 
 
+def _all(judged: Sequence[Judged]) -> str:
+    """Median and 99th percentile of the times of all robots' plans."""
+    spent = [one.milliseconds for one in judged if one.plan.parts == 1]
+    if not spent:
+        return "none"
+    low, high = np.percentile(spent, [50, 99])
+    return f"{low:.1f} ms in the median, {high:.1f} at the 99th percentile"
+
+
 def _ompl() -> str:
     """The planner's version; plans from a file need none to be judged."""
     try:
@@ -83,8 +94,13 @@ def _ompl() -> str:
         return "ompl not installed"
 
 
-def _key(one: Judged) -> tuple[str, float]:
-    return one.plan.robot, -one.plan.resolution
+def _key(one: Judged) -> tuple[str, int, float]:
+    return one.plan.robot, one.plan.parts, -one.plan.resolution
+
+
+def _robot(plan: Plan) -> str:
+    """The robot of a row, and what stands for its meshes where that is not a hull."""
+    return plan.robot if plan.parts == 1 else f"{plan.robot}, {plan.parts} hulls a mesh"
 
 
 def _sentence(judged: Sequence[Judged]) -> str:
@@ -107,7 +123,7 @@ def _row(judged: Sequence[Judged]) -> tuple[str, ...]:
     repairs = [one.repair_s for one in lost]
     missed = [sum(not one.caught[k] for one in lost) for k in range(len(DENSITIES))]
     return (
-        judged[0].plan.robot,
+        _robot(judged[0].plan),
         f"{judged[0].plan.resolution:g}",
         str(len(judged)),
         f"{len(lost)} ({100 * len(lost) / len(judged):.0f} %)",
@@ -131,7 +147,7 @@ def _proofs(judged: Sequence[Judged]) -> tuple[str, ...]:
     checked = [one.checked_s for one in proofs]
     grazing = [one.grazing_ms for one in proofs]
     return (
-        judged[0].plan.robot,
+        _robot(judged[0].plan),
         f"{judged[0].plan.resolution:g}",
         str(len(proofs)),
         str(sum(one.accepted for one in proofs)),

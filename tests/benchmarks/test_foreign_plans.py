@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from benchmarks.foreign_plans.judges import Plan, _fault, judge
 from benchmarks.foreign_plans.problems import FOLDER, problems
-from benchmarks.foreign_plans.run import outcomes
+from benchmarks.foreign_plans.run import PARTS, outcomes
 from benchmarks.foreign_plans.sampled import Sampled
 from benchmarks.foreign_plans.summary import document
 from vdsm_pin.errors import InvalidInput
@@ -95,6 +96,37 @@ def test_plan_through_a_thin_post_is_refuted_and_missed_by_its_own_samples(
     assert "| panda | 0.005 | 1 | 1 |" in page
     assert "Of 1 plans that OMPL's RRTConnect returns" in page
     assert "| panda | 0.01 | 1 | 1 (100 %)" in page
+
+
+def test_ends_that_collide_as_one_hull_are_asked_of_several(folder: Path) -> None:
+    """The post stands between the prongs of a fork, inside of its hull."""
+    prongs = [
+        ((0.4, 0.04), 0.2, 0.0),
+        ((0.04, 0.2), 0.02, 0.1),
+        ((0.04, 0.2), 0.38, 0.1),
+    ]
+    boxes = []
+    for size, x, y in prongs:
+        box = trimesh.creation.box((*size, 0.04))
+        box.apply_translation((x, y - 0.05, 0.0))
+        boxes.append(box.subdivide().subdivide())
+    trimesh.util.concatenate(boxes).export(folder / "panda" / "fork.stl")
+    box = '<box size="0.4 0.04 0.04"/></geometry></collision></link>\n<joint'
+    mesh = '<mesh filename="fork.stl"/></geometry></collision></link>\n<joint'
+    text = URDF.replace(box, mesh)
+    before, after = text.rsplit('<origin xyz="0.2 0 0"/>', 1)
+    (folder / "panda" / "panda.urdf").write_text(before + after)
+    plans = {
+        ("panda", "post", 1): [
+            Plan("panda", "post", 1, 0.01, [[0.0, 0.0], [0.5, 0.0]]),
+            Plan("panda", "post", 1, 0.01, [[0.0, 0.0], [0.05, 0.0]], PARTS),
+            Plan("panda", "post", 1, 0.01, [[0.0, 0.0], [0.5, 0.0]], PARTS),
+        ]
+    }
+    ((_, found),) = outcomes("panda", 1, plans)
+    assert [one.verdict for one in found] == ["certified", "refuted"]
+    assert not any(one.fault for one in found)
+    assert f"| panda, {PARTS} hulls a mesh | 0.01 | 2 | 1 (50 %)" in document(found, [])
 
 
 def test_false_verdicts_are_faults(folder: Path, tmp_path: Path) -> None:
