@@ -55,7 +55,7 @@ def at_waypoints(n: int, folder: Path) -> Runs:
         "cables from centres": lambda: cable_lengths(ARM, *joint_angles(ARM, centres)),
         "centres from cables": back,
         "largest joint error": lambda: largest_joint_error(problem, motion, NOMINAL),
-        "write trajectory": lambda: write_trajectory(file, motion),
+        "write trajectory": lambda: write_trajectory(motion, file),
         "read trajectory": lambda: read_trajectory(file, ARM),
     }
 

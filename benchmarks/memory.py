@@ -63,7 +63,7 @@ def measure(rows: int) -> Results:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         file = folder / "trajectory.csv"
-        write_trajectory(file, dense(motion, rows))
+        write_trajectory(dense(motion, rows), file)
         words = [
             "verify",
             PROBLEM,

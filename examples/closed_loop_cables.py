@@ -11,7 +11,7 @@ VDSM = [sys.executable, "-m", "vdsm_pin"]
 
 problem = vp.read_problem("paper/obs3")
 plan = vp.plan(problem)
-vp.write_trajectory("obs3.csv", plan.trajectory)
+vp.write_trajectory(plan.trajectory, "obs3.csv")
 
 # A kick of 10 Nm at joint 5, in the middle of the motion; all else as documented.
 Path("loop.yaml").write_text("""\

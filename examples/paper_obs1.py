@@ -28,6 +28,6 @@ print(f"every joint may be off by {np.degrees(result.joint_error):.3f} deg at on
 for one in result.closest(3):
     print(f"  {one.pair}: {1000.0 * one.lower:.3f} mm in interval {one.interval}")
 
-vp.write_trajectory("paper_obs1.csv", motion)
+vp.write_trajectory(motion, "paper_obs1.csv")
 vp.write_certificate(result, "paper_obs1.certificate", "paper_obs1.csv")
 vp.write_report(result, "paper_obs1.html")

@@ -21,6 +21,6 @@ print("changed link angles on the seam: at most", bent[motion.on_path].max())
 result = vp.verify(problem, motion, errors=vp.ErrorBox(obstacle_mm=1.0))
 print(result)
 assert result.verdict is vp.Verdict.CERTIFIED
-vp.write_trajectory("vessel.csv", motion)
+vp.write_trajectory(motion, "vessel.csv")
 vp.write_certificate(result, "vessel.certificate", "vessel.csv")
 vp.write_report(result, "port_and_vessel.html")

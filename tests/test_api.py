@@ -107,7 +107,7 @@ def test_a_problem_built_in_python_is_planned_verified_and_reported(
     assert "built in Python" in repr(problem)
     assert "certified" in (tmp_path / "report.html").read_text(encoding="utf-8")
     file = tmp_path / "t.csv"
-    vp.write_trajectory(file, plan.trajectory)
+    vp.write_trajectory(plan.trajectory, file)
     with pytest.raises(vp.InvalidInput, match="this problem has none"):
         vp.write_certificate(result, tmp_path / "c", file)
 
@@ -168,17 +168,17 @@ def test_a_certificate_is_of_the_files_that_were_verified(tmp_path: Path) -> Non
     plan = vp.plan(problem, "paper")
     result = vp.verify(problem, plan.trajectory)
     file, certificate = tmp_path / "t.csv", tmp_path / "c"
-    vp.write_trajectory(file, plan.trajectory)
+    vp.write_trajectory(plan.trajectory, file)
     vp.write_certificate(result, certificate, file)
     assert problem.source is not None
     assert check_certificate(certificate, problem.source.path, file).accepted
 
-    vp.write_trajectory(file, plan.trajectory.part(0, 50))
+    vp.write_trajectory(plan.trajectory.part(0, 50), file)
     with pytest.raises(vp.InvalidInput, match="another motion"):
         vp.write_certificate(result, certificate, file)
 
     late = replace(plan.trajectory, times=np.arange(plan.trajectory.n_samples) + 1.0)
-    vp.write_trajectory(file, late)
+    vp.write_trajectory(late, file)
     with pytest.raises(vp.InvalidInput, match="another motion"):
         vp.write_certificate(result, certificate, file)
 
@@ -194,7 +194,7 @@ def test_no_certificate_of_what_is_not_certified(tmp_path: Path) -> None:
     result = vp.verify(problem, straight)
     assert result.verdict is not vp.Verdict.CERTIFIED
     file = tmp_path / "t.csv"
-    vp.write_trajectory(file, straight)
+    vp.write_trajectory(straight, file)
     with pytest.raises(VerificationFailed, match="refuted"):
         vp.write_certificate(result, tmp_path / "c", file)
     assert not (tmp_path / "c").exists()
@@ -213,7 +213,7 @@ def test_arguments_of_another_kind_are_refused_in_a_sentence() -> None:
         "expected Problem, as of": lambda: vp.plan(None),  # type: ignore[arg-type]
         "file, as text or Path; found NoneType": lambda: vp.read_problem(None),  # type: ignore[arg-type]
         "file, as text or Path; found bytes": lambda: vp.read_problem(b"paper/free"),  # type: ignore[arg-type]
-        "file, as text or Path; found int": lambda: vp.write_trajectory(3, still),  # type: ignore[arg-type]
+        "file, as text or Path; found int": lambda: vp.write_trajectory(still, 3),  # type: ignore[arg-type]
         "pinned is 3, expected": lambda: vp.repair_trajectory(problem, still, 3),  # type: ignore[arg-type, call-overload]
         "pinned is .1.5., expected": lambda: vp.repair_trajectory(
             problem,
@@ -350,7 +350,7 @@ def test_a_certificate_states_a_turn_of_the_base(tmp_path: Path) -> None:
     motion = vp.plan(problem, "paper").trajectory
     result = vp.verify(problem, motion, errors=vp.ErrorBox(base_deg=np.rad2deg(1e-4)))
     assert result.verdict is vp.Verdict.CERTIFIED
-    vp.write_trajectory(tmp_path / "t.csv", motion)
+    vp.write_trajectory(motion, tmp_path / "t.csv")
     vp.write_certificate(result, tmp_path / "c", tmp_path / "t.csv")
     assert certificate_lines(tmp_path / "c")[0]["errors"]["base"] == [0.0, 1e-4]
     assert problem.source is not None

@@ -66,14 +66,14 @@ def test_a_report_and_a_certificate_are_of_what_was_verified(
 ) -> None:
     result = vp.verify(cell, SWEEP)
     file, proof = tmp_path / "t.csv", tmp_path / "proof"
-    vp.write_trajectory(file, SWEEP, cell)
+    vp.write_trajectory(SWEEP, file, cell)
     assert vp.read_trajectory(file, cell).q.tolist() == SWEEP.q.tolist()
     vp.write_report(result, tmp_path / "report.html")
     assert "certified" in (tmp_path / "report.html").read_text(encoding="utf-8")
     vp.write_certificate(result, proof, file)
     assert cell.source is not None
     assert check_certificate(proof, cell.source.path, file).accepted
-    vp.write_trajectory(file, replace(SWEEP, q=0.5 * SWEEP.q), cell)
+    vp.write_trajectory(replace(SWEEP, q=0.5 * SWEEP.q), file, cell)
     with pytest.raises(vp.InvalidInput, match="another motion"):
         vp.write_certificate(result, proof, file)
 
@@ -82,7 +82,7 @@ def test_what_stands_in_no_file_gets_no_certificate(
     tmp_path: Path, files: vp.RobotFiles, cell: vp.Cell
 ) -> None:
     file = tmp_path / "t.csv"
-    vp.write_trajectory(file, SWEEP, cell)
+    vp.write_trajectory(SWEEP, file, cell)
     for asked in (
         vp.cell_of(files, vp.Scene((BALL,))),
         replace(cell, required_clearance=0.1),
@@ -102,13 +102,13 @@ def test_rates_make_another_motion(tmp_path: Path, cell: vp.Cell) -> None:
     assert vp.verify(near, chord).verdict is vp.Verdict.CERTIFIED
     assert vp.verify(near, smooth).verdict is vp.Verdict.REFUTED
     file = tmp_path / "t.csv"
-    vp.write_trajectory(file, smooth, cell)
+    vp.write_trajectory(smooth, file, cell)
     again = vp.read_trajectory(file, cell)
     assert again.rates is not None
     assert again.rates.tolist() == rates.tolist()
     result = vp.verify(cell, smooth)
     vp.write_certificate(result, tmp_path / "proof", file)
-    vp.write_trajectory(file, replace(smooth, rates=rates / 2.0), cell)
+    vp.write_trajectory(replace(smooth, rates=rates / 2.0), file, cell)
     with pytest.raises(vp.InvalidInput, match="another motion"):
         vp.write_certificate(result, tmp_path / "proof", file)
 
@@ -126,7 +126,7 @@ def test_what_is_read_can_be_judged_and_written_and_read_again(
         judged = vp.verify(turned, motion).trajectory
         assert judged is not None
         assert judged.q.tolist() == motion.q.tolist()
-        vp.write_trajectory(again, motion, turned)
+        vp.write_trajectory(motion, again, turned)
         read = vp.read_trajectory(again, turned)
         np.testing.assert_allclose(read.q, motion.q, rtol=1e-15)
 
@@ -138,7 +138,7 @@ def test_rates_of_an_arm_make_another_motion(tmp_path: Path) -> None:
     none = np.zeros(2)
     smooth = vp.Trajectory(none, none, none, still, still, times=times, rates=rates)
     file = tmp_path / "t.csv"
-    vp.write_trajectory(file, replace(smooth, rates=2.0 * rates))
+    vp.write_trajectory(replace(smooth, rates=2.0 * rates), file)
     with pytest.raises(vp.InvalidInput, match="another motion"):
         vp.write_certificate(vp.verify(problem, smooth), tmp_path / "proof", file)
 
@@ -171,7 +171,7 @@ def test_what_is_of_no_robot_is_refused_in_a_sentence(
         "positions have shape": lambda: vp.JointTrajectory(turn, np.zeros(3)),
         "rates have shape": lambda: replace(SWEEP, rates=np.zeros((1, 1))),
         "each once": lambda: vp.JointTrajectory(2 * turn, np.zeros((1, 2))),
-        "with problem=": lambda: vp.write_trajectory("t.csv", SWEEP),
+        "with problem=": lambda: vp.write_trajectory(SWEEP, "t.csv"),
         "expected 0 or more": lambda: replace(cell, required_clearance=-1.0),
         "required_clearance has text": lambda: replace(cell, required_clearance="5"),  # type: ignore[arg-type]
         "scene is a list": lambda: vp.cell_of(files, [BALL]),  # type: ignore[arg-type]

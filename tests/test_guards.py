@@ -69,7 +69,7 @@ def work(rows: int, folder: Path) -> dict[str, int]:
         "cables": calls(lambda: cable_lengths(arm, *joint_angles(arm, centres))),
         "angles": calls(lambda: angles_from_cables(arm, lengths)),
         "proof": calls(lambda: prove_clearance(problem, motion, ErrorBox())),
-    } | {"write": calls(lambda: write_trajectory(file, motion)),
+    } | {"write": calls(lambda: write_trajectory(motion, file)),
          "read": calls(lambda: read_trajectory(file, arm))}  # fmt: skip
 
 

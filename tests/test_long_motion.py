@@ -37,7 +37,7 @@ def swaying(rows: int) -> Trajectory:
 def peak_of_verifying(rows: int, folder: Path) -> float:
     """Resident memory at its most; [KiB]."""
     file = folder / "long.csv"
-    write_trajectory(file, swaying(rows))
+    write_trajectory(swaying(rows), file)
     words = ["verify", "paper/obs1", "--trajectory", str(file), "--out", str(folder)]
     ended = subprocess.run(
         [sys.executable, "-c", PROGRAM, *words],

@@ -310,7 +310,7 @@ def test_nothing_takes_the_place_of_a_pipe(
     with pytest.raises(InvalidFile, match="is there and is not a regular file"):
         problem = api.read_problem("problem.yaml")
         motion = api.read_trajectory("motion.csv", problem)
-        api.write_trajectory(pipes[0], motion)
+        api.write_trajectory(motion, pipes[0])
     assert capsys.readouterr().err.count("is not a regular file") == 4
     assert all(pipe.is_fifo() for pipe in pipes)
 

@@ -111,17 +111,17 @@ def test_a_robot_whose_joints_all_stand_is_shown(tmp_path: Path) -> None:
 
 def test_a_changed_file_is_noticed_and_a_broken_one_explained(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
-    write_trajectory(path, made_up.trajectory(4))
+    write_trajectory(made_up.trajectory(4), path)
     with serving(path) as server:
         first = get(server.url)
         state = server.state()
         assert f'data-seen="{state}"' in first
-        write_trajectory(path, made_up.trajectory(6))
+        write_trajectory(made_up.trajectory(6), path)
         assert get(f"{server.url}changed?seen={state}") == "yes"
         assert get(server.url) != first
         path.write_text("not a table\n")
         assert "Cannot be shown" in get(server.url)
-        write_trajectory(path, made_up.trajectory(5))
+        write_trajectory(made_up.trajectory(5), path)
         assert "Cannot be shown" not in get(server.url)
 
 

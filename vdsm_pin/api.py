@@ -414,7 +414,7 @@ def read_trajectory(
 
     Example:
         >>> problem = read_problem("paper/free")
-        >>> write_trajectory("out/api/t.csv", plan(problem, "paper").trajectory)
+        >>> write_trajectory(plan(problem, "paper").trajectory, "out/api/t.csv")
         >>> read_trajectory("out/api/t.csv", problem).n_links
         8
     """
@@ -424,13 +424,13 @@ def read_trajectory(
 
 
 def write_trajectory(
-    path: str | Path, trajectory: Motion, problem: "ProblemOrCell | None" = None
+    trajectory: Motion, path: str | Path, problem: "ProblemOrCell | None" = None
 ) -> None:
     """Write a trajectory as CSV, with digits that read back as the same doubles.
 
     Args:
-        path: The file; it appears whole or not at all.
         trajectory: What to write.
+        path: The file; it appears whole or not at all.
         problem: Of a robot's trajectory: its joints have the units.
 
     Raises:
@@ -439,11 +439,11 @@ def write_trajectory(
 
     Example:
         >>> made = plan(read_problem("paper/free"), strategy="paper")
-        >>> write_trajectory("out/api/free_again.csv", made.trajectory)
+        >>> write_trajectory(made.trajectory, "out/api/free_again.csv")
     """
     if problem is None:
         how = "plan(problem).trajectory; or with problem=, of a robot"
-        write_arm_trajectory(path_of(path), expect(trajectory, Trajectory, how))
+        write_arm_trajectory(expect(trajectory, Trajectory, how), path_of(path))
     else:
         subject = _subject(problem)
         subject.write(path_of(path), subject.checked(trajectory))

@@ -49,7 +49,7 @@ def write(folder: Path, name: str, draft: Draft) -> Path:
     path = folder / f"{name}.yaml"
     text = yaml.safe_dump(_plain(data), sort_keys=False)
     path.write_text(text, encoding="utf-8")
-    write_trajectory(folder / f"{name}.witness.csv", draft.witness.motion)
+    write_trajectory(draft.witness.motion, folder / f"{name}.witness.csv")
     return path
 
 

@@ -83,7 +83,7 @@ class Motion:
         times, none = np.cumsum(rng.uniform(0.2, 0.6, n)), np.zeros(n)
         joints = q[:, 0], q[:, 1::2], q[:, 2::2]
         write_trajectory(
-            self.rows, Trajectory(none > 0, none, *joints, times=times, **more)
+            Trajectory(none > 0, none, *joints, times=times, **more), self.rows
         )
 
     def certify(self, errors: ErrorBox) -> bool:

@@ -60,7 +60,7 @@ class Looking:
             more["times"] = np.arange(rows) * 1.0
             more["rates"] = rates
         stations = np.append(0.0, gaps.cumsum())
-        write_trajectory(self.rows, Trajectory(on, stations, x0, *angles, **more))
+        write_trajectory(Trajectory(on, stations, x0, *angles, **more), self.rows)
         axes = centres[:, -1] - centres[:, -2]
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         aside = 0.02 * rng.normal(size=3)

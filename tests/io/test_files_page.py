@@ -50,7 +50,7 @@ def test_the_second_arm_shown_is_read(tmp_path: Path) -> None:
     none = np.zeros(2)
     angles, times = np.zeros((2, 2, 8)), np.array([0.0, 1.0])
     mate = Trajectory(none > 0, none, none, *angles, times=times)
-    write_trajectory(tmp_path / "mate.csv", mate)
+    write_trajectory(mate, tmp_path / "mate.csv")
     (tmp_path / "p.yaml").write_text(edited(EXAMPLE, ("others",)) + OTHERS)
     moving = read_problem(tmp_path / "p.yaml").scene.moving
     names = [one.name for one in moving]

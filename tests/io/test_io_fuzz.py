@@ -68,7 +68,7 @@ def damaged_trajectories(folder: Path, count: int, seed: int) -> list[bytes]:
     trajectory = Trajectory(
         [True] * 5, np.arange(5) / 100, q[:, 0], q[:, 1::2], q[:, 2::2]
     )
-    write_trajectory(folder / "whole.csv", trajectory)
+    write_trajectory(trajectory, folder / "whole.csv")
     whole = (folder / "whole.csv").read_bytes()
     return [changed_bytes(whole, rng) for _ in range(count)]
 

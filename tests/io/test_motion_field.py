@@ -104,7 +104,7 @@ def rows(n: int = 3) -> Trajectory:
 
 def test_times_are_written_and_read_to_the_last_bit(tmp_path: Path) -> None:
     path, motion = tmp_path / "t.csv", rows()
-    write_trajectory(path, motion)
+    write_trajectory(motion, path)
     found = read_trajectory(path, built_in("hrm8"))
     assert found.times is not None and motion.times is not None
     assert found.times.tolist() == motion.times.tolist()
@@ -113,7 +113,7 @@ def test_times_are_written_and_read_to_the_last_bit(tmp_path: Path) -> None:
 
 def test_times_that_do_not_rise_name_their_line(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
-    write_trajectory(path, rows())
+    write_trajectory(rows(), path)
     text = path.read_text().replace(",0.3\n", ",0.1\n")
     path.write_text(text)
     with pytest.raises(InvalidFile, match=r"line 3.*time_s is 0.1, expected a time"):

@@ -119,7 +119,7 @@ LIMITS: dict[str, tuple[ModuleType, str, int, Reader, Made]] = {
     "rows": (
         tables, "MAX_ROWS", 7,
         lambda path: read_trajectory(path, built_in("hrm8")),
-        table(lambda path: write_trajectory(path, motion(7))),
+        table(lambda path: write_trajectory(motion(7), path)),
     ),
     "centres": (
         tables, "MAX_ROWS", 7, lambda path: read_centres(path, FREE),

@@ -81,7 +81,7 @@ def test_places_on_a_path_may_be_missing_where_there_is_none(tmp_path: Path) -> 
 def test_file_is_text_as_stated(tmp_path: Path) -> None:
     one = np.array([[0.1, 1e-20], [-0.0, 1 / 3]])
     trajectory = Trajectory([True, False], [0.0, 0.01], [1.0, -2.5], one, -one)
-    write_trajectory(tmp_path / "t.csv", trajectory)
+    write_trajectory(trajectory, tmp_path / "t.csv")
     assert (tmp_path / "t.csv").read_bytes() == (
         b"waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,alpha2_rad,theta2_rad\n"
         b"0,1,0.0,1.0,0.1,-0.1,1e-20,-1e-20\n"
@@ -109,14 +109,14 @@ def test_every_double_comes_back_to_the_last_bit(
 ) -> None:
     path = tmp_path_factory.mktemp("round") / "t.csv"
     trajectory = Trajectory(on_path, np.abs(stations), x0, angles[:, :2], angles[:, 2:])
-    write_trajectory(path, trajectory)
+    write_trajectory(trajectory, path)
     assert same(read_trajectory(path, short_arm()), trajectory)
 
 
 @pytest.mark.parametrize("n", [1, 4_999, 5_000, 5_001])
 def test_round_trip_across_chunks(tmp_path: Path, n: int) -> None:
     trajectory = random_trajectory(n, 2)
-    write_trajectory(tmp_path / "t.csv", trajectory)
+    write_trajectory(trajectory, tmp_path / "t.csv")
     assert same(read_trajectory(tmp_path / "t.csv", short_arm()), trajectory)
 
 
@@ -384,12 +384,12 @@ def test_a_table_has_decimal_points_or_decimal_commas(
 
 def test_failed_writing_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
-    write_trajectory(path, random_trajectory(3, 2))
+    write_trajectory(random_trajectory(3, 2), path)
     before = path.read_bytes()
     broken = random_trajectory(3, 2)
     object.__setattr__(broken, "path_m", None)
     with pytest.raises(TypeError):
-        write_trajectory(path, broken)
+        write_trajectory(broken, path)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["t.csv"]
 
@@ -399,7 +399,7 @@ def test_memory_stays_near_that_of_the_arrays(tmp_path: Path) -> None:
     trajectory = random_trajectory(n, 8)
     arrays_size = sum(getattr(trajectory, field).nbytes for field in FIELDS)
     tracemalloc.start()
-    write_trajectory(tmp_path / "t.csv", trajectory)
+    write_trajectory(trajectory, tmp_path / "t.csv")
     writing = tracemalloc.get_traced_memory()[1]
     tracemalloc.reset_peak()
     read_trajectory(tmp_path / "t.csv", HRM8)
@@ -420,7 +420,7 @@ def smooth_file(folder: Path, *, quintic: bool = True) -> Path:
         rates=rates,
         changes=changes if quintic else None,
     )  # fmt: skip
-    write_trajectory(folder / "t.csv", motion)
+    write_trajectory(motion, folder / "t.csv")
     return folder / "t.csv"
 
 
@@ -429,7 +429,7 @@ def test_velocities_and_accelerations_are_read_to_the_last_bit(tmp_path: Path) -
     motion = read_trajectory(path, arm)
     assert motion.is_smooth and motion.changes is not None
     copy = tmp_path / "again.csv"
-    write_trajectory(copy, motion)
+    write_trajectory(motion, copy)
     assert copy.read_bytes() == path.read_bytes()
     cubic = read_trajectory(path, arm, "cubic")
     assert cubic.rates is not None and cubic.changes is None

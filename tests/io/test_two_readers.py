@@ -213,7 +213,7 @@ def test_both_read_trajectories_alike(tmp_path: Path) -> None:
     q = rng.uniform(-0.7, 0.7, (50, 17)) * 10.0 ** rng.integers(-12, 1, (50, 17))
     on_path = rng.uniform(size=50) < 0.5
     trajectory = Trajectory(on_path, abs(q[:, 1]), q[:, 0], q[:, 1::2], q[:, 2::2])
-    write_trajectory(tmp_path / "t.csv", trajectory)
+    write_trajectory(trajectory, tmp_path / "t.csv")
     ours = read_trajectory(tmp_path / "t.csv", built_in("hrm8"))
     rows = list(ball_reader.read_rows(tmp_path / "t.csv", 8))
     np.testing.assert_array_equal(ours.joints, [numbers(row.joints) for row in rows])

@@ -127,7 +127,7 @@ class MadeArm:
         for name, text in self.texts.items():
             (self.folder / name).write_text(text)
         for name, motion in self.motions.items():
-            write_trajectory(self.folder / name, motion)
+            write_trajectory(motion, self.folder / name)
 
     @property
     def files(self) -> tuple[Path, Path]:

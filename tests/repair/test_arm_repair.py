@@ -161,7 +161,7 @@ def test_smooth_motion_is_repaired_as_a_smooth_one(
     dense = after.path.at(np.linspace(0.0, times[-1], 40_000))
     assert least_gap(problem, given.joints) < problem.required_clearance
     assert least_gap(problem, dense) >= problem.required_clearance - 1e-9
-    write_trajectory(tmp_path / "t.csv", after)
+    write_trajectory(after, tmp_path / "t.csv")
     read = read_trajectory(tmp_path / "t.csv", problem.manipulator)
     assert read.path.same_as(after.path)
 
@@ -211,7 +211,7 @@ def test_command_repairs_what_it_is_given(tmp_path: Path) -> None:
     assert "required_clearance: 3.5" in text
     file, given, out = tmp_path / "p.yaml", tmp_path / "t.csv", tmp_path / "out"
     file.write_text(text.replace("required_clearance: 3.5", "required_clearance: 33.5"))
-    write_trajectory(given, motion)
+    write_trajectory(motion, given)
     words = ["repair", str(file), "--trajectory", str(given), "--out", str(out)]
     ended = CliRunner().invoke(app, words, obj="vdsm repair")
     assert ended.exit_code == 0, ended.output
@@ -233,7 +233,7 @@ def test_a_repaired_motion_that_is_not_proved_as_written_is_no_success(
     Nothing is written then.
     """
     given, verify = tmp_path / "t.csv", app_repair.verify_into
-    write_trajectory(given, planned("paper/free")[1])
+    write_trajectory(planned("paper/free")[1], given)
 
     def late(order: VerifyOrder, motion: Given, aside: Path) -> Verified:
         order = replace(order, options=MotionOptions(Deadline.after(0.0)))

@@ -44,7 +44,7 @@ def both(folder: Path, seed: int) -> tuple[Path, Path]:
     arm = Trajectory.of_joints(
         rows, np.zeros(3, bool), np.zeros(3), times=TIMES["left"]
     )
-    write_trajectory(folder / "arm.csv", arm)
+    write_trajectory(arm, folder / "arm.csv")
     write(folder, "ball.urdf", urdf(BALL))
     turns = rng.uniform(-2.5, 2.5, 3)
     write(folder, "ball.csv", rows_text(turns, TIMES["right"]))
@@ -122,7 +122,7 @@ def test_limits_of_a_snake_arm_among_others(share: float, tmp_path: Path) -> Non
     angles = np.array([[-0.1, 0.6, 0.2, 0.3, -0.4], [0.1, -0.7, 0.1, 0.2, 0.5]])
     none = np.zeros(2, bool), np.zeros(2)
     motion = Trajectory.of_joints(angles, *none, times=np.array([0.0, 3.0]))
-    write_trajectory(tmp_path / "arm.csv", motion)
+    write_trajectory(motion, tmp_path / "arm.csv")
     limit, problem = share * np.rad2deg(0.7), json.loads(ball.read_text())
     problem["others"][0]["manipulator"] |= {"max_joint_angle_deg": limit}
     ball.write_text(json.dumps(problem))

@@ -593,7 +593,7 @@ def test_trajectories_are_converted(
     angles = rng.uniform(-0.1, 0.1, (2, 4, 8))
     flags = np.zeros(4, dtype=np.bool_)
     arm = Trajectory(flags, np.zeros(4), rng.uniform(0, 1, 4), *angles)
-    write_trajectory(tmp_path / "arm.csv", arm)
+    write_trajectory(arm, tmp_path / "arm.csv")
     words = ("convert", "paper/obs1", "--trajectory")
     assert run(*words, tmp_path / "arm.csv", "--out", out, *formats) == 0
     for name in names:

@@ -146,7 +146,7 @@ def test_settings_that_do_not_fit_the_arm_are_refused_by_their_file(
 ) -> None:
     kick = Kick(axis="theta", joint=9, share=0.1, torque_nm=1.0)
     problem, rows = read_problem("paper/obs3"), tmp_path / "t.csv"
-    vp.write_trajectory(rows, bending(10, angle=0.02))
+    vp.write_trajectory(bending(10, angle=0.02), rows)
     settings, file = Settings(kicks=(kick,)), tmp_path / "set.yaml"
     with pytest.raises(InvalidInput, match=r"set\.yaml: kicks\[0\]\.joint is 9"):
         simulate_to_folder(problem, rows, tmp_path / "out", settings, file)
@@ -174,7 +174,7 @@ def test_a_folder_holds_what_the_verifier_takes(
 ) -> None:
     problem = read_problem("paper/obs3")
     file = tmp_path / "t.csv"
-    vp.write_trajectory(file, bending(10, angle=0.02))
+    vp.write_trajectory(bending(10, angle=0.02), file)
     told = simulate_to_folder(problem, file, tmp_path / "out", Settings())
     executed = vp.read_trajectory(tmp_path / "out" / "executed.csv", problem)
     assert executed.n_links == 8
@@ -205,7 +205,7 @@ def test_places_on_a_path_are_not_asked_for_where_there_is_none(
 
     monkeypatch.setattr("vdsm_pin.simulation.folder.simulate", reached)
     with_path, file = read_problem("paper/obs3"), tmp_path / "t.csv"
-    vp.write_trajectory(file, bending(10, angle=0.02))
+    vp.write_trajectory(bending(10, angle=0.02), file)
     lines = [line.split(",") for line in file.read_text().splitlines()]
     file.write_text("\n".join(",".join([row[0], *row[3:]]) for row in lines) + "\n")
     assert lines[0][:4] == ["waypoint", "on_path", "path_m", "x0_m"]

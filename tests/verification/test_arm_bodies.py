@@ -389,7 +389,7 @@ def written(folder: Path, **arm: Any) -> tuple[Path, Path]:
     alpha, theta = -0.2 * t * np.ones((1, 4)), 0.1 * t * np.ones((1, 4))
     blank = np.zeros(6)
     motion = Trajectory(blank > 0.0, blank, 0.1 * t[:, 0], alpha, theta)
-    write_trajectory(rows, motion)
+    write_trajectory(motion, rows)
     return problem, rows
 
 

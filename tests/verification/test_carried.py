@@ -64,7 +64,7 @@ def motion_in(folder: Path, joints: Any) -> Path:
     rows, path = np.array(joints, float), folder / "rows.csv"
     blank = np.zeros(len(rows))
     motion = Trajectory(blank > 0, blank, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
-    write_trajectory(path, motion)
+    write_trajectory(motion, path)
     return path
 
 

@@ -107,7 +107,7 @@ def test_a_path_m_beyond_its_extent_is_refused(tmp_path: Path) -> None:
     n, most = 2, TOLERANCES.path_extent
     parts = np.zeros(n), np.zeros((n, 8)), np.zeros((n, 8))
     motion = Trajectory(np.ones(n, bool), np.array([0.0, most]), *parts)
-    write_trajectory(tmp_path / "t.csv", motion)
+    write_trajectory(motion, tmp_path / "t.csv")
     read_trajectory(tmp_path / "t.csv", built_in("hrm8"))
     text = (tmp_path / "t.csv").read_text().replace("10000.0", "10000.000000000002")
     (tmp_path / "t.csv").write_text(text)

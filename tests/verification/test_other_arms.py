@@ -65,7 +65,7 @@ def write_pair(folder: Path, seed: int) -> tuple[Path, Path]:
         rpy = rng.uniform(-180.0, 180.0, 3).tolist()
         bases.append(f"{{position: {place}, rpy_deg: {rpy}}}")
         files.append(f"t{k}.csv")
-        write_trajectory(folder / files[k], random_motion(rng, count))
+        write_trajectory(random_motion(rng, count), folder / files[k])
     for k in range(2):
         text = TEXT % (f"p{k}", arms[k], bases[k], arms[1 - k], bases[1 - k],
                        files[1 - k])  # fmt: skip
@@ -167,11 +167,11 @@ def test_either_arm_is_as_far_from_the_other(seed: int, tmp_path: Path) -> None:
             )  # fmt: skip
         same = np.linspace(0.0, 2.0, n)
         write_trajectory(
-            tmp_path / f"t{k}.csv",
             Trajectory(
                 motion.on_path, motion.path_m, motion.x0, motion.alpha, motion.theta,
                 times=same, rates=motion.rates,
             ),
+            tmp_path / f"t{k}.csv",
         )  # fmt: skip
     least = []
     for k, path in enumerate(paths):

@@ -103,7 +103,7 @@ class ArmSubject:
 
     def write(self, file: Path, motion: Trajectory) -> None:
         """Write a motion as CSV."""
-        write_trajectory(file, motion)
+        write_trajectory(motion, file)
 
     def write_tables(self, folder: Path, verification: ArmVerification) -> None:
         """Write link angles, joint centres and cable lengths."""

@@ -158,7 +158,7 @@ def plan_to_folder(
             raise
     plan = refinement.plan
     with staged(folder) as staging:
-        write_trajectory(staging / TRAJECTORY, plan.trajectory)
+        write_trajectory(plan.trajectory, staging / TRAJECTORY)
         write_centres(staging / CENTRES, problem, plan.trajectory, plan.centres)
         write_cables(staging / CABLES, problem, plan.trajectory)
         digest = sha256_of_file(staging / TRAJECTORY)

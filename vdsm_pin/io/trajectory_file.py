@@ -112,12 +112,12 @@ def rate_names(n_links: int, order: int) -> tuple[str, ...]:
     return (f"{x0}_{what}_m_{power}", *(f"{a}_{what}_rad_{power}" for a in angles))
 
 
-def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
+def write_trajectory(trajectory: Trajectory, path: str | Path) -> None:
     """Write a trajectory, whole or not at all.
 
     Args:
-        path: The CSV file; an existing one is replaced.
         trajectory: What to write.
+        path: The CSV file; an existing one is replaced.
 
     Raises:
         CannotWrite: If the file cannot be written.

@@ -135,7 +135,7 @@ def simulate_to_folder(
     file = summary(problem, planned, found, settings, digest)
     check_unchanged(trajectory, digest)
     with staged(folder) as staging:
-        write_trajectory(staging / EXECUTED, found.trajectory)
+        write_trajectory(found.trajectory, staging / EXECUTED)
         _write_record(staging / RECORD, found)
         (staging / SUMMARY).write_text(file.text(), encoding="utf-8")
         text = page(file, found, settings, problem.required_clearance)
