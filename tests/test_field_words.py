@@ -14,6 +14,7 @@ FIELD = {
     "glide": "cached plane",
     "graft": "population growth",
     "hasty": "verdict alone",
+    "narrowing": "refining",
     "taste": "cost",
     "taper": "corner",
 }

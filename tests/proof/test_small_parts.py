@@ -83,7 +83,8 @@ place_two, turn_back = plain(packed_tree.place_two), plain(swept_bodies.turn_bac
 place_point, to_body = plain(swept_bodies.place_point), plain(swept_bodies.to_body)
 local_point, finer = plain(swept_bodies.local_point), plain(terms.finer)
 new_bends, stay = plain(bends.new_bends), plain(bends.stay)
-bend_between, hold = plain(bends.bend_between), plain(cached_clearances.hold)
+bend_between = plain(bends.bend_between)
+cache_clearance = plain(cached_clearances.cache_clearance)
 raise_to_held = plain(cached_clearances.raise_to_held)
 keep_least, new_runs = plain(far_pairs.keep_least), plain(plane_bounds.new_runs)
 bound_below = plain(plane_bounds.bound_below)
@@ -582,7 +583,7 @@ def test_a_held_clearance_falls_as_the_body_moves() -> None:
         body.points[:] = rng.normal(size=body.points.shape)
         body.used[:] = 2 * corners, corners
         plane = np.zeros(HELD_AT + 3 * corners)
-        hold(plane, 5.0, body)
+        cache_clearance(plane, 5.0, body)
         assert plane[HELD_CLEARANCE] == 5.0
         ends = body.points[corners : 2 * corners]
         assert np.array_equal(plane[HELD_AT:], ends.ravel())

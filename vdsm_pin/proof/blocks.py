@@ -8,7 +8,7 @@ from vdsm_pin.proof.broad_phase import settle_far
 from vdsm_pin.proof.cached_planes import served
 from vdsm_pin.proof.far_pairs import merge_far
 from vdsm_pin.proof.layouts import OWN_POINT, UP, VERSION, WIDTH
-from vdsm_pin.proof.least_bracket import narrow
+from vdsm_pin.proof.least_bracket import refine
 from vdsm_pin.proof.pair_sweep import CLOSELY, LOOSELY, YES_OR_NO, Block, sweep_pair
 from vdsm_pin.proof.plane_bounds import bound_above, bound_below
 from vdsm_pin.proof.results import Results, count_the_rest, note_block, note_upper
@@ -117,7 +117,7 @@ def run_sweep(sweep: Sweep, span: tuple[int, int], yes_or_no: bool) -> bool:
 
 
 @compiled
-def judge(sweep: Sweep, span: tuple[int, int], narrowing: bool) -> bool:
+def judge(sweep: Sweep, span: tuple[int, int], refining: bool) -> bool:
     """Judge some intervals, whatever the time does not allow as undecided.
 
     The far pairs are brought to the results, the witnesses placed on the surfaces.
@@ -128,15 +128,15 @@ def judge(sweep: Sweep, span: tuple[int, int], narrowing: bool) -> bool:
     Args:
         sweep: What they are judged with.
         span: The intervals.
-        narrowing: Whether to narrow the least brackets, of all intervals, in time.
+        refining: Whether to refine the least brackets, of all intervals, in time.
     """
     sweep = borrowed(sweep)
     task, motion, ends = sweep.task, sweep.motion, sweep.work.ends
     in_time, results = _run_sweep(sweep, span, False), sweep.results
     merge_far(task, motion, ends, results, sweep.broad)
     count_the_rest(results, span[1] - span[0])
-    if in_time and narrowing:
-        narrow(sweep, ACROSS)
-        narrow(sweep, WITHIN)
+    if in_time and refining:
+        refine(sweep, ACROSS)
+        refine(sweep, WITHIN)
     place_best(task, motion, ends, results.best)
     return in_time

@@ -13,7 +13,7 @@ class Budget:
 
     Args:
         slices: Most slices of one interval and pair.
-        candidates: Most blocks, and then intervals, kept for narrowing the least
+        candidates: Most blocks, and then intervals, kept for refining the least
             bracket.
         profile: Most values of a profile; beyond it intervals share a bin.
         slack: Brackets wider than this part of the clearance are asked of a new plane;

@@ -15,7 +15,7 @@ from vdsm_pin.proof.terms import Mover
 
 
 @compiled
-def hold(plane: FloatArray, clearance: float, body: Body) -> None:
+def cache_clearance(plane: FloatArray, clearance: float, body: Body) -> None:
     """Remember the clearance proved over a slice, and the body at the end of it.
 
     Args:

@@ -114,15 +114,15 @@ def _raise_bounds(
             bound = min(proved[pair], results.overflow[group])
             best[pair, LOW], least = max(best[pair, LOW], bound), min(least, bound)
     if group == ACROSS:
-        # Every interval keeps what the narrowing proved of all of them.
+        # Every interval keeps what refining proved of all of them.
         for column in range(profile.shape[1]):
             for k in range(profile.shape[2]):
                 profile[0, column, k] = max(profile[0, column, k], least)
 
 
 @compiled(inline=False)
-def narrow(sweep: Sweep, group: int) -> None:
-    """Narrow the least bracket of a group of pairs.
+def refine(sweep: Sweep, group: int) -> None:
+    """Refine the least bracket of a group of pairs.
 
     Args:
         sweep: Its results hold the candidates; bounds, profile and limit are improved.

@@ -20,7 +20,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL, Goal
 from vdsm_pin.geometry.obstacles import node_support
-from vdsm_pin.proof.cached_clearances import hold
+from vdsm_pin.proof.cached_clearances import cache_clearance
 from vdsm_pin.proof.cached_planes import Demand, try_plane
 from vdsm_pin.proof.layouts import (
     AT_UPPER,
@@ -128,7 +128,7 @@ def _renew(
         loaded_bound(task, space, version, True, bar)
         proved = space.out[LOWER]
         if space.body.discs[0, RADIUS] == 0.0:
-            hold(plane, proved, space.body)
+            cache_clearance(plane, proved, space.body)
     plane[:3], plane[POINT:WIDTH] = space.out[NORMAL:NEAR], space.out[FAR:BRACKET]
     n, stack, point = plane[:3], space.stack, space.scratch[0]
     plane[SUPPORT] = node_support(pieces, root, n, stack, point)

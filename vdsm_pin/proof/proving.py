@@ -119,7 +119,7 @@ class Proving:
         """Bracket the clearance of every pair over the whole path.
 
         Returns:
-            The proof, its least brackets narrowed unless the time ended before; what
+            The proof, its least brackets refined unless the time ended before; what
             is not judged is undecided.
         """
         return self.found(bool(judge(self.sweeping, (0, self.n_intervals), True)))

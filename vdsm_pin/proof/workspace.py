@@ -57,7 +57,7 @@ def new_workspace(
         n_columns: Length of a row of q.
         budget: Most slices of one interval and pair.
         block: Most intervals whose rows are filled at once, BLOCK at most.
-        candidates: Most intervals kept for narrowing the least bracket.
+        candidates: Most intervals kept for refining the least bracket.
     """
     n_joints, n_ways = task.tree.parent.size, task.ways.rest.size
     corners = int(np.diff(task.bodies.first).max(initial=1))

@@ -124,7 +124,7 @@ def _chunk(
     swapped = ~motion.asked.outer[None, :, None]
     chunk = ClearanceChunk(
         first_interval=first,
-        # No interval is worse than what narrowing proved of all of them.
+        # No interval is worse than what refining proved of all of them.
         lower=frozen(np.maximum(dense.lower[:count], least)),
         upper=frozen(dense.upper[:count]),
         share=frozen(dense.time[:count]),
@@ -186,7 +186,7 @@ def prove_motion(
             left out of what the sinks receive; [m].
 
     Returns:
-        The proof, its least brackets narrowed unless the time ended before.
+        The proof, its least brackets refined unless the time ended before.
     """
     asked, proving = motion.asked, motion.proving(budget)
     step("proving the clearance of %d pairs", asked.table.size)
