@@ -89,11 +89,7 @@ if TYPE_CHECKING:
     MovableModel: TypeAlias = shapes.NamedModel
 else:
     _MODELS = tuple(
-        shapes.with_field(getattr(shapes, f"{kind}Model"), _CanMove, "Obstacle")
-        for kind in (
-            *("Cylinder", "Prism", "Sphere", "Capsule", "Box"),
-            *("HalfSpace", "Mesh", "Points", "Voxels"),
-        )
+        shapes.with_field(shape, _CanMove, "Obstacle") for shape in shapes.SHAPES
     )
     MovableModel = Annotated[Union[_MODELS], Field(discriminator="shape")]  # noqa: UP007
 

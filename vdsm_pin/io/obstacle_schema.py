@@ -1,6 +1,6 @@
 """The nine shapes of the problem file as pydantic models."""
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, create_model
 
@@ -147,6 +147,13 @@ class VoxelsModel(FromFileModel):
         description="Edge lengths of a cell [length_unit]; the first cell of an array "
         "begins at its origin."
     )
+
+
+SHAPES: Final = (
+    *(CylinderModel, PrismModel, SphereModel, CapsuleModel, BoxModel),
+    *(HalfSpaceModel, MeshModel, PointsModel, VoxelsModel),
+)
+"""All of them, in the order of the schema."""
 
 
 def with_field(shape: type[NamedModel], more: type[FileModel], noun: str) -> Any:
