@@ -11,7 +11,7 @@ import trimesh
 
 import vdsm_pin.refinement as refinement
 from vdsm_pin import margins
-from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
+from vdsm_pin.errors import Infeasible, InsideUnknown, InvalidInput, NoPlanFound
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.margins import CoalMeasure, by_coal, of_pairs, raised_margins
@@ -21,6 +21,7 @@ from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.problem.desired_path import Approach
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_check
@@ -293,3 +294,20 @@ def test_a_motion_that_was_clear_is_measured_again_where_more_is_asked() -> None
     more = measure(motion, 0.010)
     assert more and all(one.distance < 0.0135 for one in more)
     assert measure(motion) == ()
+
+
+@pytest.mark.parametrize(
+    ("pointing", "fault"),
+    [
+        (Pointing(0.1, target=np.array([3.126, 0.95, 0.95])), "target on the path"),
+        (Pointing(0.1, directions=np.array([[1.0, 0, 0], [-1.0, 0, 0]])), "opposite"),
+    ],
+)
+def test_a_path_along_which_the_tip_looks_nowhere_is_refused(
+    pointing: Pointing, fault: str
+) -> None:
+    """Files refuse it where they are read; a problem built in Python is planned."""
+    problem = short("free")
+    path = replace(problem.path, pointing=pointing)
+    with pytest.raises(InvalidInput, match=fault):
+        refinement.plan_and_verify(replace(problem, tip_path=path), "fewest")

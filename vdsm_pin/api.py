@@ -67,6 +67,7 @@ def plan(
         UnknownName: If there is no such strategy.
         Infeasible: If no certified plan was found.
         OutOfTime: If none was found in time.
+        InvalidInput: If the problem asks for what makes no sense.
 
     Example:
         >>> made = plan(read_problem("paper/free"), strategy="paper")

@@ -114,8 +114,11 @@ def plan_and_verify(
         UnknownName: If there is no such strategy.
         Infeasible: If the strategy has no plan, or none that is proved.
         OutOfTime: If the time is over.
+        InvalidInput: If the last link shall look nowhere somewhere on the path.
     """
-    scene = problem.scene
+    scene, path = problem.scene, problem.tip_path
+    if path is not None and path.pointing is not None:
+        path.pointing.check_aims(path.corners)
     if not scene.moving:
         return _plan_at_rest(problem, strategy_name, deadline)
     still = replace(problem, scene=scene.at_time(scene.rest_time))
