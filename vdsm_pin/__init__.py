@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from vdsm_pin.robots.files import MeshCover, RobotFiles
     from vdsm_pin.verification.records import Verdict
 
-__version__ = "0.12.0"
+__version__ = "0.13.0"
 
 __all__ = [
     "Box",
